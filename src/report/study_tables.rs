@@ -231,8 +231,10 @@ pub fn trials(study: &ReportedStudy) -> Table {
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
         let ticks = if study.recorded(row.trial).is_some() { "yes" } else { "no" };
-        let verdict = row.verdict_name().unwrap_or("none");
-        let verdict = if study.best == Some(row.trial) { format!("{verdict}, best") } else { verdict.to_owned() };
+        let mut verdict = row.verdict_name().unwrap_or("not judged").to_owned();
+        for (holds, text) in [(row.counts_by_hand(), ", J by hand"), (study.best == Some(row.trial), ", best")] {
+            verdict += if holds { text } else { "" };
+        }
         let cells = std::iter::once(Cell::count(row.trial as usize)).chain(parameter_cells(study, row));
         let expected = [row.expected.map(|expected| expected.value), row.expected.map(|expected| expected.p_stand)];
         let expected = expected.into_iter().zip([3, 2]).filter(|_| expects);
@@ -244,19 +246,20 @@ pub fn trials(study: &ReportedStudy) -> Table {
     table
 }
 
-/// Falls, void trials and notes; none if there are none.
+/// Falls, void trials, verdicts that differ from the suggested ones, and notes; none if there are none.
 pub fn remarks(studies: &[ReportedStudy]) -> Option<Table> {
     let columns = ["study", "trial", "verdict", "cause", "note"].map(Column::text);
-    let mut table = Table::new("Falls and void trials with their causes, and notes.", columns);
+    let mut table =
+        Table::new("Falls, void trials and verdicts of the operator with their causes, and notes.", columns);
     for study in studies {
         for row in &study.rows {
-            let failed = matches!(row.verdict, Some(Verdict::Fall | Verdict::Void));
-            if failed || !row.note.is_empty() {
+            let explained = matches!(row.verdict, Some(Verdict::Fall | Verdict::Void)) || row.is_overruled();
+            if explained || !row.note.is_empty() {
                 table.rows.push(vec![
                     Cell::text(title(study)),
                     Cell::text(row.trial.to_string()),
-                    Cell::text(row.verdict_name().unwrap_or("none")),
-                    Cell::text(if failed { row.cause.clone() } else { String::new() }),
+                    Cell::text(row.verdict_name().unwrap_or("not judged")),
+                    Cell::text(if explained { row.cause.clone() } else { String::new() }),
                     Cell::text(row.note.clone()),
                 ]);
             }

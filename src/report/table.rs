@@ -38,13 +38,13 @@ pub fn best_line(
     text
 }
 
-/// Verdict of a trial with its cause.
+/// Verdict of a trial, whether its value is by hand, and the cause of a verdict other than a suggested accept.
 fn verdict(row: &TrialRecord) -> String {
-    match row.verdict_name() {
-        None => "not judged".to_owned(),
-        Some(name) if row.verdict == Some(Verdict::Accept) || row.cause.is_empty() => name.to_owned(),
-        Some(name) => format!("{name}: {}", row.cause),
-    }
+    let Some(name) = row.verdict_name() else { return "not judged".to_owned() };
+    let by_hand = if row.counts_by_hand() { ", J by hand" } else { "" };
+    let explained = row.verdict != Some(Verdict::Accept) || row.is_overruled();
+    let cause = if explained && !row.cause.is_empty() { format!(": {}", row.cause) } else { String::new() };
+    format!("{name}{by_hand}{cause}")
 }
 
 /// The trials of a study of another program as an aligned table, with parameters of every kind; the trial of number `best`

@@ -162,7 +162,7 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
             OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
-                write!(f, "change the verdict of trial {trial} to {}: {reason}", verdict.name())
+                write!(f, "change the verdict of trial {trial} to {} ({reason})", verdict.name())
             }
             OperatorRequest::TakeControl => f.write_str("take control"),
         }

@@ -7,6 +7,10 @@ pub(super) const CHECK: ControlCheck = ControlCheck {
     measure: |inputs, settings| {
         Reading::worst_joint(settings.arming.motor_c, |joint| inputs.state.motor_temperature_c[joint])
     },
-    found: |finding| format!("{} {:.0} C", joint_of(finding), finding.measured),
+    found: |finding| match finding.measured > 0.0 {
+        true => format!("{} {:.0} C", joint_of(finding), finding.measured),
+        // As the simulator: zeros.
+        false => "no temperature is reported".to_owned(),
+    },
     needed: |limits| format!("at most {:.0} C", limits.motor_c),
 };

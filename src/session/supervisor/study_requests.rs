@@ -7,25 +7,26 @@ use crate::trial::{Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
+    let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
+    let again = format!("{trial} is void, and its parameters are proposed again");
     match request {
         OperatorRequest::Judge(verdict) => {
-            judged(experiment.judge(*verdict, false), "u takes it back until the next trial is approved or skipped")
+            let answer = format!("{trial}; u takes it back until the next trial is approved or skipped");
+            judged(experiment.judge(*verdict, false), answer)
         }
-        OperatorRequest::Rerun { trial: None } => {
-            judged(experiment.judge(Verdict::Void, true), "void, and its parameters are proposed again")
+        OperatorRequest::Rerun { trial: None } => judged(experiment.judge(Verdict::Void, true), again),
+        OperatorRequest::VoidBecause { reason, rerun: false } => {
+            judged(experiment.void_because(reason, false), format!("{trial} is void"))
         }
-        OperatorRequest::VoidBecause { reason, rerun: false } => judged(experiment.void_because(reason, false), "void"),
-        OperatorRequest::VoidBecause { reason, rerun: true } => {
-            judged(experiment.void_because(reason, true), "void, and its parameters are proposed again")
-        }
+        OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
         _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
     }
 }
 
 /// The answer to a verdict. If another program has ended the trial, the review is over as well.
-fn judged(judged: Result<(), RequestRefusal>, answer: &str) -> JobOutput {
+fn judged(judged: Result<(), RequestRefusal>, answer: String) -> JobOutput {
     let over = matches!(judged, Ok(()) | Err(RequestRefusal::EndedElsewhere(_)));
-    JobOutput::Judged(judged.map(|()| answer.to_owned()).map_err(|refusal| refusal.to_string()), over)
+    JobOutput::Judged(judged.map(|()| answer).map_err(|refusal| refusal.to_string()), over)
 }
 
 fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<String, RequestRefusal> {
@@ -75,7 +76,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
             let before = experiment.change_verdict(*trial, *verdict, reason)?;
-            format!("trial {trial} is {} now, was {}; the journal keeps both", verdict.name(), before.name())
+            format!("it was {}; the journal keeps both", before.name())
         }
         OperatorRequest::HandValue(value) => {
             experiment.set_hand_value(*value)?;
