@@ -94,6 +94,7 @@ fn a_key_returns_to_the_present_and_back_to_the_landed_trial() {
     assert!(present.contains(" 8 s sweep") && !present.contains("TRIAL #1"), "{present}");
     assert_shows(&present, &["the charts show the present; z shows trial 1 again"]);
     console.press(&["z"]);
+    assert_eq!(console.said(), "the charts show trial 1; z shows the present");
     assert_shows(&console.screen(80, 24), &["TRIAL #1", "#0 under it"]);
     console.press(&["2"]);
     assert!(!console.screen(80, 24).contains("TRIAL #1"), "the other views show the present");
@@ -185,6 +186,14 @@ fn accepting_what_was_not_suggested_asks_once_more() {
         &["Accept a void trial?", "The suggested verdict of trial #0 is void", "void hides the trial"],
     );
     assert_eq!(console.requests(&["y"]), accept);
+    // Nothing was measured, or the operator stopped it: a fall would keep the sampler away from its parameters.
+    let mut console = Console::review(Mode::Damped, Verdict::Void);
+    assert_eq!(console.requests(&["f", "n"]), []);
+    assert_eq!(console.said(), "cancelled: not judged a fall");
+    assert_eq!(console.requests(&["f"]), []);
+    let parts = ["Judge a void trial a fall?", "Fall reports J = 0", "Press y to judge trial #0 a fall"];
+    assert_shows(&console.screen(80, 24), &parts);
+    assert_eq!(console.requests(&["y"]), [OperatorRequest::Judge(Verdict::Fall)]);
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     assert_eq!(console.requests(&["a"]), accept, "a suggested accept needs one key");
 }
@@ -294,10 +303,82 @@ fn the_verdict_of_a_selected_row_is_changed_with_a_reason() {
     console.enter("lay");
     let change = OperatorRequest::ChangeVerdict { trial: 0, verdict: Verdict::Fall, reason: "it lay".into() };
     assert_eq!(console.requests(&["Enter"]), [change]);
-    // While a trial waits for its verdict the keys are for that one.
+    // While a trial waits for its verdict the keys are for that one, and refused on another row.
     console.stage(ExperimentStage::Running, 2);
     assert_eq!(console.requests(&["f"]), [], "during a trial");
     console.record(Record::Trial(trial(2, None, Some(Verdict::Accept))));
     console.stage(ExperimentStage::Review, 2);
+    for key in ["a", "f", "v", "r", "="] {
+        assert_eq!(console.requests(&[key]), [], "{key}");
+        assert_shows(
+            console.said(),
+            &[&format!("{key} is not possible: trial 2 waits for its verdict, but 0 is selected")],
+        );
+        assert!(console.model.dialog.is_none(), "{key}");
+    }
+    console.press(&["End"]);
     assert_eq!(console.requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
+}
+
+/// Regression: the arrows of the details showed other trials, and the keys of the verdict still judged the waiting one.
+#[test]
+fn the_keys_act_on_the_trial_whose_details_are_shown() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Fall), None)));
+    console.record(Record::Trial(trial(1, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 1);
+    console.press(&["Enter"]);
+    assert_shows(&console.screen(80, 24), &["Trial #1"]);
+    console.press(&["Up"]);
+    assert_eq!(console.requests(&["a"]), []);
+    assert_shows(console.said(), &["trial 1 waits for its verdict, but 0 is selected"]);
+}
+
+/// Regression: keys acted on a row that the filter left out.
+#[test]
+fn no_key_acts_on_a_row_that_the_filter_leaves_out() {
+    let mut console = Console::ready();
+    for (number, verdict) in [(0, Verdict::Fall), (1, Verdict::Accept), (2, Verdict::Accept)] {
+        console.record(Record::Trial(trial(number, Some(verdict), None)));
+    }
+    console.stage(ExperimentStage::Proposed, 3);
+    console.press(&["2", "F", "F"]);
+    assert_shows(&console.screen(120, 40), &["only fall (F)", ">  0"]);
+    console.press(&["v"]);
+    assert_shows(&console.screen(80, 24), &["Trial #0: fall becomes void. Why?"]);
+    console.press(&["Esc", "/", "2", "Enter"]);
+    assert_shows(&console.screen(80, 24), &["the table leaves trial 2 out; F and b show others"]);
+    console.press(&["Esc", "F", "F", "b"]);
+    assert_shows(&console.screen(120, 40), &["best only (b)"]);
+}
+
+#[test]
+fn the_question_before_quitting_says_what_becomes_of_the_waiting_trial() {
+    for (suggested, follows) in [
+        (Verdict::Accept, "It keeps its measurement and waits"),
+        (Verdict::Void, "It is void, as suggested, and its parameters run again."),
+    ] {
+        let mut console = Console::review(Mode::Review, suggested);
+        assert_eq!(console.press(&["q"]), []);
+        assert_shows(&console.screen(120, 40), &["Quit?", "it will sit down", "Trial #0 has no verdict yet.", follows]);
+    }
+}
+
+#[test]
+fn the_field_for_a_value_by_hand_says_what_is_measured_and_what_the_robot_has_measured() {
+    let mut console = Console::review(Mode::Disarmed, Verdict::Accept);
+    console.press(&["="]);
+    let parts = ["displacement forward, start to rest", "the robot measured 0.420 m", "Space is STOP"];
+    assert_shows(&console.screen(120, 40), &parts);
+}
+
+#[test]
+fn the_help_of_a_waiting_trial_begins_with_the_verdicts() {
+    let first = |console: &mut Console| {
+        console.press(&["?"]);
+        let screen = console.screen(80, 24);
+        screen.lines().nth(4).map(|line| line.trim_matches(['│', ' ']).to_owned())
+    };
+    assert_eq!(first(&mut Console::review(Mode::Review, Verdict::Accept)).as_deref(), Some("Verdict"));
+    assert_eq!(first(&mut Console::ready()).as_deref(), Some("Robot"));
 }

@@ -118,7 +118,7 @@ fn hostile_viewers_cost_the_recording_nothing() {
     greedy.write_all(&[&[0x81, 0xfe], &length[..], &[0; 4], text.as_bytes()].concat()).unwrap();
     let study = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
     // A key before it cancels the countdown.
-    session.wait_for_long("the trial is judged", || session.screen().contains("1 of 1 judged"));
+    session.wait_for_long("the trial is judged", || session.screen().contains("1 of 1 count"));
     assert!(silent.iter_mut().all(|stream| stream.set_nodelay(true).is_ok()));
     end(session);
     let mut in_trial: Vec<u64> = Vec::new();

@@ -246,7 +246,7 @@ fn a_console_session_rotates_between_its_trials_and_loses_no_tick() {
     let mut session = Session::start(folder.path(), (120, 40), &arguments);
     let study = || std::fs::read_dir(folder.path()).unwrap().next().map(|entry| entry.unwrap().path());
     // A key cancels a countdown: none before the study ends.
-    session.wait_for_long("four trials", || session.screen().contains("4 of 4 judged"));
+    session.wait_for_long("four trials", || session.screen().contains("4 of 4 count"));
     assert!(recordings_in(&study().unwrap()).len() >= 3);
     // The present file is named.
     session.send("5");

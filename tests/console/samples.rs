@@ -42,7 +42,7 @@ fn the_samples_are_small_whole_and_of_the_present_format() {
 
 #[test]
 fn the_samples_are_replayed() {
-    for (name, shown) in [("forward", ["of 20 judged", "best 0.721 m (#12)"]), ("fall", ["fall", "pitch 1.0004 rad"])] {
+    for (name, shown) in [("forward", ["of 20 count", "best 0.721 m (#12)"]), ("fall", ["fall", "pitch 1.0004 rad"])] {
         let folder = tempfile::tempdir().unwrap();
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
         command.args(["replay", &recording(name)]);

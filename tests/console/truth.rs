@@ -90,9 +90,9 @@ fn details_show_the_bounds_with_which_a_trial_ran() {
     console.record(Record::Search(SearchStatus { parameters: vec![searched], ..SearchStatus::default() }));
     console.stage(ExperimentStage::Proposed, 3);
     console.press(&["2", "Home", "Enter"]);
-    assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 0 to 150)"]);
+    assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 0 to 150 N)"]);
     console.press(&["Down"]);
-    assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 20 to 130)"]);
+    assert_shows(&line_with(&console.screen(120, 40), "75.00000 N"), &["(searched from 20 to 130 N)"]);
     console.press(&["Down"]);
     assert!(!line_with(&console.screen(120, 40), "75.00000 N").contains("searched"), "its bounds are not known here");
 }
@@ -216,5 +216,7 @@ fn a_study_of_falls_alone_has_no_scale_of_its_values() {
     let mut console = Console::ready();
     console.record(Record::Trial(TrialRecord { value: Some(0.0), ..trial(0, Some(Verdict::Fall), None) }));
     let screen = console.screen(80, 24);
-    assert!(screen.contains("no value yet") && !screen.contains("0.001"), "{screen}");
+    assert!(screen.contains("none accepted yet") && !screen.contains("0.001"), "{screen}");
+    console.press(&["3"]);
+    assert!(!console.screen(80, 24).contains("0.001"), "{}", console.screen(80, 24));
 }

@@ -6,7 +6,7 @@ use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
-use quadfrog_console::message::{Msg, ReplayStatus};
+use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use support::{Console, assert_shows, session, trial};
 
@@ -131,4 +131,15 @@ fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
     assert_shows(&screen, &["`p` does not belong here: a time, a trial as #7, or best is typed"]);
     console.press(&["Enter"]);
     assert_shows(&console.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
+}
+
+/// Regression: messages stayed after what they offered, or what they described, had ended.
+#[test]
+fn a_message_ends_with_what_it_describes() {
+    let mut console = Console::ready();
+    console.press(&["Ctrl-C"]);
+    assert_eq!(console.said(), "STOP: damping. Ctrl-C again within 2 s quits");
+    console.wait(2_100);
+    assert_eq!(console.said(), "STOP: damping.");
+    assert_eq!(console.press(&["Ctrl-C"]), [Effect::Stop], "the offer is over");
 }

@@ -3,7 +3,7 @@
 #[path = "support/pty.rs"]
 mod pty;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use pty::Session;
@@ -14,6 +14,12 @@ fn quadfrog(folder: &Path, arguments: &[&str]) -> String {
         Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The folder of the only study there.
+fn study_in(folder: &Path) -> PathBuf {
+    let mut below = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    below.find(|path| path.join("study.log").exists()).expect("a study")
 }
 
 #[test]
@@ -41,7 +47,7 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     session.send("f");
     session.wait_for(&["Trial #0: accept becomes fall. Why?"]);
     session.send("it lay on its back\r");
-    session.wait_for(&["trial 0 is fall now, was accept; the journal keeps both"]);
+    session.wait_for(&["change the verdict of trial 0 to fall", "it was accept; the journal keeps both"]);
     session.wait_for(&["changed by the operator, was accept"]);
     // The table shows one of two trials: the export asks.
     session.send("F");
@@ -57,8 +63,7 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     session.wait_for(&["written: all 2 trials"]);
     assert!(session.quit().success());
 
-    let study = std::fs::read_dir(folder.path()).expect("the folder").map(|entry| entry.expect("an entry").path());
-    let study = study.into_iter().find(|path| path.join("study.log").exists()).expect("a study");
+    let study = study_in(folder.path());
     let table = std::fs::read_to_string(study.join("trials.csv")).expect("trials.csv");
     let row = table.lines().nth(1).expect("trial 0");
     assert!(row.contains(",fall,") && row.contains("was accept: it lay on its back"), "{table}");
@@ -70,4 +75,44 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     let exported = quadfrog(folder.path(), &["study", "export", study.to_str().expect("a path")]);
     let row = exported.lines().find(|line| line.contains("it lay on its back"));
     assert!(row.is_some_and(|row| row.contains("fall")), "{exported}");
+}
+
+/// Regression: a session that ended in the review made the measured jump void, and the value by hand was lost with it.
+#[test]
+fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    session.send("=");
+    session.wait_for(&["displacement forward, start to rest; the robot measured"]);
+    session.send("0.4\r");
+    session.wait_for(&["0.4 m counts instead of the measured value"]);
+    session.send("q");
+    session.wait_for(&["It keeps its measurement and waits"]);
+    session.send("y");
+    assert!(session.wait().success());
+
+    let study = study_in(folder.path());
+    let arguments = ["--resume", study.to_str().expect("a name")];
+    let mut session = Session::start(folder.path(), (120, 40), &arguments);
+    session.wait_for(&["Trial #0: judge it", "0.400 m by hand", "Judge it: a accept (suggested)"]);
+    session.wait_for(&["trial 0 waits for its verdict since the last session"]);
+    // Killed, it still waits.
+    session.signal(nix::sys::signal::Signal::SIGKILL);
+    session.wait();
+    let mut session = Session::start(folder.path(), (120, 40), &arguments);
+    session.wait_for(&["Trial #0: judge it", "0.400 m by hand"]);
+    session.send("a");
+    session.wait_for(&["1 of 20 count", "best 0.400 m by hand (#0)", "accept: trial 0; u takes it back"]);
+    assert!(session.quit().success());
+
+    let study = study.to_str().expect("a name");
+    let shown = quadfrog(folder.path(), &["study", "show", study]);
+    assert!(shown.contains("accept, J by hand"), "{shown}");
+    let report = quadfrog(folder.path(), &["report", study]);
+    assert!(report.contains("accept, J by hand, best"), "{report}");
 }

@@ -320,7 +320,7 @@ fn details_show_all_values_of_a_trial() {
     let screen = console.screen(80, 24);
     assert_shows(
         &screen,
-        &["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s", "from 0 to 150)"],
+        &["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s", "from 0 to 150 N)"],
     );
     assert!(line_with(&screen, "attempt").contains('2'), "{screen}");
 }
@@ -601,8 +601,7 @@ fn the_details_and_the_exported_table_hold_touchdown_bounces_and_every_jump() {
     console.record(Record::Trial(row));
     console.press(&["2", "Enter"]);
     let parts = [
-        "+0.7500 m, +0.0100 m",
-        "at 1.700 s",
+        "at 1.700 s, +0.7500 m forward, +0.0100 m left, turned +0.0200 rad",
         "3 flights after the impulse",
         "0.00 s, x +0.000 m",
         "1.00 s, x +0.400 m",

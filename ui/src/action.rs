@@ -170,9 +170,9 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),
         row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study"),
 
-        row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value (Trials: also a judged row)"),
-        row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0 (Trials: also a judged row)"),
-        row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler (Trials: also a judged row)"),
+        row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value (Trials, while none waits: change the selected row, with a reason)"),
+        row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0 (Trials: as accept)"),
+        row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler (Trials: as accept)"),
         row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
         row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial is approved or refused"),
         row(A::HandValue, "hand-value", &["="], G::Verdict, "use a value measured by hand"),

@@ -6,7 +6,7 @@ use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 use ratatui::layout::Size;
 
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
-use crate::layout::{MIN_COLUMNS, MIN_ROWS, shows_trial};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, MIN_COLUMNS, MIN_ROWS, shows_trial};
 use crate::model::{Model, View};
 
 /// Whether an action is possible now; the reason if it is not.
@@ -43,7 +43,8 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Void => may_judge(model, Verdict::Void),
         A::HandValue => {
             may_request(model)?;
-            require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")
+            require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")?;
+            waiting_trial_is_meant(model)
         }
         A::Rerun => may_rerun(model),
         A::Undo => {
@@ -170,13 +171,20 @@ fn may_sit_down(model: &Model) -> Legality {
 
 /// Energising the robot requires a screen that shows it.
 fn must_be_visible(model: &Model) -> Legality {
+    let shows = |columns: u16, rows: u16| {
+        // A line that is wider than the terminal takes two rows: at most what is expected and the distance to falls.
+        let needed = model.session.trial_rows() + if columns < MIN_COLUMNS { 2 } else { 0 };
+        shows_trial(Size::new(columns, rows), needed)
+    };
     let (columns, rows) = model.size;
-    // A line that is wider than the terminal takes two rows: at most what is expected and the distance to falls.
-    let needed = model.session.trial_rows() + if columns < MIN_COLUMNS { 2 } else { 0 };
-    if shows_trial(Size::new(columns, rows), needed) {
+    if shows(columns, rows) {
         return Ok(());
     }
-    refuse(format!("enlarge the terminal to {MIN_COLUMNS}x{MIN_ROWS}: the proposal must be visible"))
+    let (columns, rows) = match shows(COMPACT_COLUMNS, COMPACT_ROWS) {
+        true => (COMPACT_COLUMNS, COMPACT_ROWS),
+        false => (MIN_COLUMNS, MIN_ROWS),
+    };
+    refuse(format!("enlarge the terminal to {columns}x{rows}: the proposal must be visible"))
 }
 
 fn may_approve(model: &Model) -> Legality {
@@ -233,10 +241,26 @@ fn may_clear_overrides(model: &Model) -> Legality {
     require(model.session.open_proposal().is_some_and(changed), "nothing was overridden")
 }
 
+/// While a trial waits for its verdict, no other row of Trials may be the selected one: a verdict could be meant for that.
+fn waiting_trial_is_meant(model: &Model) -> Legality {
+    let waiting = model.session.under_review().map(|row| row.trial);
+    let selected = model.selected_trial().map(|row| row.trial).filter(|_| model.view == View::Trials);
+    match (waiting, selected) {
+        (Some(waiting), Some(selected)) if waiting != selected => {
+            let live = model.keymap.key(Action::LiveView);
+            refuse(format!(
+                "trial {waiting} waits for its verdict, but {selected} is selected; judge {waiting} first, in its row or in Live ({live})"
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Under review, or in Trials a judged row that has another verdict.
 fn may_judge(model: &Model, verdict: Verdict) -> Legality {
     may_request(model)?;
     if model.session.stage_is(ExperimentStage::Review) {
+        waiting_trial_is_meant(model)?;
         let value = model.session.under_review().and_then(|row| model.session.value_if_accepted(row));
         let key = model.keymap.key(Action::HandValue);
         let reason = format!("nothing was measured: {key} gives a value measured by hand, or judge it otherwise");
@@ -253,7 +277,7 @@ fn may_judge(model: &Model, verdict: Verdict) -> Legality {
 fn may_rerun(model: &Model) -> Legality {
     may_request(model)?;
     if model.session.stage_is(ExperimentStage::Review) {
-        return Ok(());
+        return waiting_trial_is_meant(model);
     }
     match model.selected_trial() {
         Some(trial) if model.view == View::Trials && trial.verdict.is_some() => Ok(()),

@@ -98,8 +98,8 @@ pub enum Dialog {
 pub enum Question {
     /// Refuse this proposal.
     Skip { trial: u32, revision: u32 },
-    /// Accept a trial whose suggested verdict is another.
-    AcceptAnyway { trial: u32 },
+    /// Accept a trial whose suggested verdict is another, or judge one a fall whose suggested verdict is void.
+    JudgeAnyway { trial: u32, verdict: Verdict },
     /// Use a value measured by hand that lies far from the robot's own measurement.
     HandValue { trial: u32, value: f64 },
 }

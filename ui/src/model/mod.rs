@@ -12,6 +12,7 @@ pub(crate) mod rejudged;
 pub mod session;
 pub(crate) mod trials;
 
+use std::f64::consts::PI;
 use std::time::Duration;
 
 use quadfrog::config::Config;
@@ -45,6 +46,12 @@ use trials::TrialTable;
 
 /// Torque of a joint at rest that damping leaves: friction and the error of the motor's estimate, N m.
 const DAMPED_TORQUE_N_M: f64 = 2.0;
+
+/// Time after which an answer is no news any more.
+const NEWS_TIME: Duration = Duration::from_secs(15);
+
+/// Tilt of a robot that no longer lies on its belly, rad: half a right angle.
+const LYING_TILT_RAD: f64 = 0.25 * PI;
 
 /// One of the tabs, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
@@ -81,6 +88,11 @@ impl Notice {
     /// Its age in whole minutes at `clock`.
     pub fn age_min(&self, clock: Duration) -> u64 {
         clock.saturating_sub(self.at).as_secs() / 60
+    }
+
+    /// Whether it is no news any more at `clock`.
+    pub fn is_old(&self, clock: Duration) -> bool {
+        clock.saturating_sub(self.at) >= NEWS_TIME
     }
 }
 
@@ -262,6 +274,12 @@ impl Model {
         self.replay.is_none() && self.mode().energised()
     }
 
+    /// Whether a simulated robot is tilted so far that arming turns it upright first.
+    pub fn simulated_robot_lies(&self) -> bool {
+        let tilt = self.snapshot.tick.estimate.roll_pitch_yaw.xy().amax();
+        self.session.info.backend == Some(Backend::Simulator) && tilt > LYING_TILT_RAD
+    }
+
     /// Whether the arming checks are those of an earlier time: they run while the robot is disarmed.
     pub fn arming_checks_are_past(&self) -> bool {
         self.mode() != Mode::Disarmed
@@ -344,12 +362,17 @@ impl Model {
         last.or_else(|| self.session.trials.records.get(&trial))
     }
 
-    /// The trial that actions of the trial table apply to: the selected one, or the newest.
+    /// The trial that actions of the trial table apply to: the selected one, or the newest; where the table's filter hides that,
+    /// the shown one whose number is nearest.
     pub fn selected_trial(&self) -> Option<&TrialRecord> {
-        match self.trial_table.selected {
+        let wanted = match self.trial_table.selected {
             Some(number) => self.trial(number),
             None => self.session.trials.newest().or_else(|| self.later_trials().next()),
+        }?;
+        if !self.trial_table.is_filtered() {
+            return Some(wanted);
         }
+        self.trial_rows().into_iter().min_by_key(|row| row.trial.abs_diff(wanted.trial))
     }
 
     /// The trial that a note and the details apply to.

@@ -57,6 +57,11 @@ impl SessionModel {
         self.under_review().filter(|trial| trial.suggested.is_some_and(|verdict| verdict != Verdict::Accept))
     }
 
+    /// The trial that waits for its verdict, if this one is suggested.
+    pub fn suggested(&self, verdict: Verdict) -> Option<&TrialRecord> {
+        self.under_review().filter(|trial| trial.suggested == Some(verdict))
+    }
+
     /// The proposal that waits for approval.
     pub fn open_proposal(&self) -> Option<&Proposal> {
         let trial = self.trial_in(ExperimentStage::Proposed)?;

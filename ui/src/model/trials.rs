@@ -55,6 +55,11 @@ impl Trials {
         Some((best.trial, by_model.map(|model| model.value).or(best.value)?))
     }
 
+    /// Whether the value of the best trial was measured by hand.
+    pub fn best_is_by_hand(&self) -> bool {
+        self.model_best.is_none() && self.best().is_some_and(|best| best.hand_value.is_some())
+    }
+
     /// The accepted trials that were better than all before them, in order.
     pub fn best_so_far(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
         let accepted = self.records.values().filter_map(|trial| Some((trial, trial.trial, accepted_value(trial)?)));
@@ -116,6 +121,11 @@ pub struct TrialTable {
 }
 
 impl TrialTable {
+    /// Whether it may leave trials out.
+    pub fn is_filtered(&self) -> bool {
+        self.best_only || self.filter.is_some()
+    }
+
     /// The rows, sorted and filtered; `later` are those of a replay that follow after the playhead.
     pub fn rows<'a>(
         &self,

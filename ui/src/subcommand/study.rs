@@ -11,7 +11,7 @@ use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_s
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
-use quadfrog::optimize::trial::TrialState;
+use quadfrog::optimize::trial::{CHANGED_VERDICT, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, rows_of};
@@ -194,7 +194,8 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let Opened { study, ours, parameters } = &opened;
     let mut text = String::new();
     let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
-    for (name, value) in study.attributes() {
+    // The causes of changed verdicts stand in the table.
+    for (name, value) in study.attributes().iter().filter(|(name, _)| !name.starts_with(CHANGED_VERDICT)) {
         let _ = writeln!(text, "  {name}: {}", in_words(value, if name == "bounds" { " to " } else { " " }));
     }
     for parameter in parameters {

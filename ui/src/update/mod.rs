@@ -26,7 +26,7 @@ use crate::model::session::SessionModel;
 use crate::settings::BellCause;
 use dialog::KeyOutcome;
 use perform::perform;
-use request::{interrupt, request, stop};
+use request::{expire_interrupt, interrupt, request, stop};
 
 pub use request::say;
 
@@ -37,7 +37,10 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Mouse(event) => return mouse::handle(model, event),
         Msg::Record(stamped) => return records::apply(model, stamped),
         Msg::Suspend => return perform(model, Action::Suspend),
-        Msg::Clock(now) => model.clock = now,
+        Msg::Clock(now) => {
+            model.clock = now;
+            expire_interrupt(model);
+        }
         Msg::Resize(columns, rows) => {
             model.size = (columns, rows);
             // The frame, the tabs, a heading and the two lines below are not part of a page.

@@ -86,7 +86,8 @@ pub(super) fn freeze(model: &mut Model) {
     }
     if model.live.present_in_review && model.live.frozen.is_none() && reviewed.is_some() {
         model.live.present_in_review = false;
-        if model.landed().is_some() {
+        if let Some(trial) = model.landed().map(|landed| landed.trial) {
+            say(model, LogLevel::Info, format!("the charts show trial {trial}; {key} shows the present"));
             return;
         }
     }

@@ -67,7 +67,13 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ExportBest => return vec![Effect::ExportBest],
         Action::Accept if model.session.not_to_accept().is_some() => {
             if let Some(trial) = model.session.not_to_accept().map(|row| row.trial) {
-                open(model, Dialog::Confirm(Question::AcceptAnyway { trial }));
+                open(model, Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Accept }));
+            }
+        }
+        // Nothing was measured, or the operator has stopped it: the sampler would avoid its parameters.
+        Action::Fall if model.session.suggested(Verdict::Void).is_some() => {
+            if let Some(trial) = model.session.suggested(Verdict::Void).map(|row| row.trial) {
+                open(model, Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Fall }));
             }
         }
         Action::Accept => return judge(model, Verdict::Accept),

@@ -2,7 +2,7 @@
 
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
+use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 
 use super::request::say;
 use crate::action::Action;
@@ -25,7 +25,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let shown = model.session.open_proposal().map(|p| (p.trial, p.revision));
             shown != Some((*trial, *revision)) || legal(Action::Skip, model).is_err()
         }
-        Some(Dialog::Confirm(Question::AcceptAnyway { trial })) => {
+        Some(Dialog::Confirm(Question::JudgeAnyway { trial, .. })) => {
             model.session.not_to_accept().is_none_or(|row| row.trial != *trial)
         }
         Some(Dialog::Confirm(Question::HandValue { trial, .. })) => {
@@ -110,8 +110,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
         }
         Record::Proposal(proposal) => {
-            let values: Vec<String> =
-                proposal.parameters.iter().map(|p| format!("{} {:.4}", p.name, p.value)).collect();
+            let unit =
+                |name: &str| model.session.parameter(name).map_or(String::new(), |info| format!(" {}", info.unit));
+            let value = |p: &ProposedParameter| format!("{} {}{}", p.name, six_digits(p.value), unit(&p.name));
+            let values: Vec<String> = proposal.parameters.iter().map(value).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
             log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
             model.session.proposal = Some(proposal);

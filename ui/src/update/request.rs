@@ -13,6 +13,22 @@ use crate::model::{Model, Notice};
 /// A second Ctrl-C within this time quits.
 const INTERRUPT_WINDOW: Duration = Duration::from_secs(2);
 
+/// End of the message that offers to quit.
+const AGAIN_QUITS: &str = "Ctrl-C again within 2 s quits";
+
+/// Takes the offer to quit from the message line once it does not hold any more.
+pub(super) fn expire_interrupt(model: &mut Model) {
+    if model.interrupted_at.is_none_or(|at| model.clock.saturating_sub(at) < INTERRUPT_WINDOW) {
+        return;
+    }
+    model.interrupted_at = None;
+    if let Some(rest) = model.message.as_mut().and_then(|message| message.text.strip_suffix(AGAIN_QUITS)) {
+        let rest = rest.trim_end().to_owned();
+        model.message =
+            model.message.take().filter(|_| !rest.is_empty()).map(|message| Notice { text: rest, ..message });
+    }
+}
+
 /// Shows a line to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
     model.message = Some(Notice { level, text: text.into(), stop: false, at: model.clock });
@@ -81,8 +97,8 @@ pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
     }
     let effects = stop(model);
     match effects.is_empty() {
-        true => say(model, LogLevel::Warning, "Ctrl-C again within 2 s quits"),
-        false => say_stop(model, "STOP: damping. Ctrl-C again within 2 s quits"),
+        true => say(model, LogLevel::Warning, AGAIN_QUITS),
+        false => say_stop(model, &format!("STOP: damping. {AGAIN_QUITS}")),
     }
     effects
 }

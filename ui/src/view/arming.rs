@@ -100,7 +100,10 @@ fn line(
     let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
     let wide = width.is_none_or(|width| width >= WIDE);
     let text = match (item.found.as_str(), item.needed.as_str()) {
-        (found, needed) if wide && item.state != ArmingCheckState::NotNeeded && !needed.is_empty() => {
+        (found, needed) if wide && item.state == ArmingCheckState::NotNeeded && !found.is_empty() => {
+            format!("{found} ({needed})")
+        }
+        (found, needed) if wide && !needed.is_empty() => {
             format!("{found} (needed: {needed})")
         }
         ("", text) | (text, _) => text.to_owned(),

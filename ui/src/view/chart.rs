@@ -65,6 +65,8 @@ pub struct Ghost<'a> {
 /// A chart with its heading line. Under two rows nothing is drawn.
 pub struct Chart<'a> {
     pub style: SeriesStyle,
+    /// Least and largest value of its vertical axis.
+    pub range: (f32, f32),
     pub axis: TimeAxis,
     pub history: &'a SignalHistory,
     /// The phase of each column, from [`phases`].
@@ -78,13 +80,28 @@ pub struct Chart<'a> {
     pub theme: Theme,
 }
 
+impl SeriesStyle {
+    /// The first of the series' ranges that holds what is drawn of it.
+    pub fn range_of(&self, history: &SignalHistory, axis: &TimeAxis, ghost: Option<Ghost<'_>>) -> usize {
+        let ghost = ghost.iter().flat_map(|ghost| ghost.trace);
+        let samples = history.window(axis.window_ns).chain(ghost);
+        let values = samples.flat_map(|sample| [Some(self.value(sample)), self.commanded(sample)]);
+        let (low, high) = values
+            .flatten()
+            .filter(|value| value.is_finite())
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let holds = |range: &(f32, f32)| low >= range.0 && high <= range.1;
+        self.ranges.iter().position(holds).unwrap_or(self.ranges.len().saturating_sub(1))
+    }
+}
+
 impl Chart<'_> {
     pub fn draw(&self, buffer: &mut Buffer, area: Rect) {
         if area.height < 2 || area.width < AXIS + 8 {
             return;
         }
         let plot = plot_columns(Rect { y: area.y + 1, height: area.height - 1, ..area });
-        let (low, high) = self.range();
+        let (low, high) = self.range;
         self.draw_heading(buffer, Rect { height: 1, ..area });
         self.draw_ticks(buffer, plot, (low, high));
         self.draw_zero(buffer, plot, (low, high));
@@ -103,20 +120,6 @@ impl Chart<'_> {
         dots.draw(buffer, plot, self.theme.style(self.style.role));
         self.shade(buffer, plot);
         self.draw_cursor(buffer, plot);
-    }
-
-    /// The first of the series' ranges that holds what is drawn.
-    fn range(&self) -> (f32, f32) {
-        let ghost = self.ghost.iter().flat_map(|ghost| ghost.trace);
-        let samples = self.history.window(self.axis.window_ns).chain(ghost);
-        let values = samples.flat_map(|sample| [Some(self.style.value(sample)), self.style.commanded(sample)]);
-        let (low, high) = values
-            .flatten()
-            .filter(|value| value.is_finite())
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let ranges = self.style.ranges;
-        let widest = ranges.last().copied().unwrap_or((-1.0, 1.0));
-        ranges.iter().find(|range| low >= range.0 && high <= range.1).copied().unwrap_or(widest)
     }
 
     /// The values at the ends and in the middle of the vertical axis.

@@ -48,12 +48,13 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         let unit = index.map_or("", |index| session.info.parameters[index].unit.as_str());
         let range = trial.ranges.iter().find(|range| range.name == *name);
         let bounds = range.map_or(String::new(), |range| {
-            format!("  (searched from {} to {})", six_digits(range.low), six_digits(range.high))
+            format!("  (searched from {} to {} {unit})", six_digits(range.low), six_digits(range.high))
         });
         row(name, format!("{value:.5} {unit}{bounds}"));
     }
     if !trial.gains.is_empty() {
-        let gain = |(name, value): &(String, f64)| format!("{name} {}", six_digits(*value));
+        let unit = |name: &str| session.gain(name).map_or(String::new(), |gain| format!(" {}", gain.unit));
+        let gain = |(name, value): &(String, f64)| format!("{name} {}{}", six_digits(*value), unit(name));
         row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
     }
     if let Some(m) = &trial.measured {
@@ -62,7 +63,10 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("rise, air", format!("{:.4} m, {:.3} s", m.apex_m, m.air_s));
         if let Some(at) = m.touchdown {
             let Displacement { time_s, dx_m, dy_m, dyaw_rad } = at;
-            row("touchdown", format!("{dx_m:+.4} m, {dy_m:+.4} m, {dyaw_rad:+.4} rad at {time_s:.3} s"));
+            row(
+                "touchdown",
+                format!("at {time_s:.3} s, {dx_m:+.4} m forward, {dy_m:+.4} m left, turned {dyaw_rad:+.4} rad"),
+            );
         }
         if m.flights > 1 {
             row("bounced", format!("{} flights after the impulse", m.flights));

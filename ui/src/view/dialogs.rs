@@ -10,7 +10,7 @@
 //! ```
 
 use quadfrog::session::operator_request::OperatorCheck;
-use quadfrog::trial::six_digits;
+use quadfrog::trial::{Task, six_digits};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -249,7 +249,7 @@ fn field(
         spans.push(span(theme, Role::Quiet, format!(" {}", model.session.info.unit)));
     }
     let hint = match purpose {
-        Purpose::HandValue(_) => "replaces the measured value; empty: back to the measured one".to_owned(),
+        Purpose::HandValue(trial) => by_hand(model, trial),
         Purpose::Bounds { parameter } => {
             let info = model.session.info.parameters.get(parameter);
             let searched = info.and_then(|info| model.session.searched(&info.name));
@@ -280,6 +280,24 @@ fn field(
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
     vec![Line::from(spans), Line::default(), Line::from(below)]
+}
+
+/// What a value by hand stands for, and what the robot has measured.
+fn by_hand(model: &Model, trial: u32) -> String {
+    let info = &model.session.info;
+    let along = match info.task.filter(|task| task.unit() == info.unit) {
+        Some(Task::Forward) => "displacement forward, start to rest",
+        Some(Task::LateralLeft) => "displacement to the left, start to rest",
+        Some(Task::LateralRight) => "displacement to the right, start to rest",
+        Some(Task::TwistCcw) => "turn counterclockwise, start to rest",
+        Some(Task::TwistCw) => "turn clockwise, start to rest",
+        None => "J",
+    };
+    let measured = model.session.trials.records.get(&trial).and_then(|row| model.session.measured_objective(row));
+    match measured {
+        Some(value) => format!("{along}; the robot measured {} {}; empty: back to that", number(value), info.unit),
+        None => format!("{along}; the robot measured nothing"),
+    }
 }
 
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {

@@ -19,11 +19,16 @@ pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static>
 /// In place of what is not known of a robot that sends no states.
 pub const NO_STATE: &str = "no state from the robot";
 
+/// Columns of a heading with both its texts.
+pub fn heading_width(title: &str, aside: &str) -> usize {
+    title.chars().count() + aside.chars().count() + 4
+}
+
 /// A heading with a line to the right edge; returns the area below it.
 pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside: &str) -> Rect {
     let [top, rest] = Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]).areas(area);
     // Where there is no room for both, the title stays.
-    let aside = if title.chars().count() + aside.chars().count() + 4 > usize::from(area.width) { "" } else { aside };
+    let aside = if heading_width(title, aside) > usize::from(area.width) { "" } else { aside };
     let used = title.chars().count() + aside.chars().count() + 2 + usize::from(!aside.is_empty());
     let fill = theme.line().repeat(usize::from(area.width).saturating_sub(used));
     let mut spans = vec![span(theme, Role::Heading, title), Span::raw(" "), span(theme, Role::Quiet, fill)];

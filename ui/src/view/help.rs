@@ -12,12 +12,17 @@ use crate::theme::Role;
 /// Columns before the text of an action.
 pub const INDENT: usize = 13;
 
-/// The keys by group, in a replay those of the replay first.
+/// The keys by group: in a replay those of the replay first, and while a trial waits for its verdict those of the verdict.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
     let mut groups = ActionGroup::VARIANTS.to_vec();
-    groups.sort_by_key(|group| model.replay.is_some() && *group != ActionGroup::Replay);
+    let first = match (&model.replay, model.session.under_review()) {
+        (Some(_), _) => Some(ActionGroup::Replay),
+        (None, Some(_)) => Some(ActionGroup::Verdict),
+        (None, None) => None,
+    };
+    groups.sort_by_key(|group| first.is_some_and(|first| *group != first));
     for group in groups {
         if !lines.is_empty() {
             lines.push(Line::default());

@@ -10,7 +10,7 @@ use ratatui::widgets::Paragraph;
 
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
 use super::draw::{NO_STATE, bar, heading, span, without_sign_of_zero};
-use super::series_style::style;
+use super::series_style::{SeriesStyle, style};
 use super::{beside, objective, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
@@ -205,9 +205,16 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
         .map(|cell| (cell, phases(&source.axis, &source.history, cell.width)))
         .collect();
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
-    for (index, series) in series.iter().enumerate().take(across * down) {
+    let drawn: Vec<SeriesStyle> = series.iter().take(across * down).map(|series| style(*series, model)).collect();
+    let own: Vec<usize> =
+        drawn.iter().map(|style| style.range_of(&source.history, &source.axis, source.ghost)).collect();
+    for (index, style) in drawn.iter().enumerate() {
+        // Charts of the same quantity have the same axis.
+        let alike = drawn.iter().zip(&own).filter(|(other, _)| other.ranges == style.ranges);
+        let range = alike.map(|(_, range)| *range).max().unwrap_or(0);
         let chart = Chart {
-            style: style(*series, model),
+            style: *style,
+            range: style.ranges.get(range).copied().unwrap_or((-1.0, 1.0)),
             axis: source.axis,
             history: &source.history,
             phases: &of_columns[index % across].1,

@@ -2,7 +2,7 @@
 
 use quadfrog::robot::joint_name;
 use quadfrog::session::prior::PriorProgress;
-use quadfrog::telemetry::Mode;
+use quadfrog::telemetry::{Mode, TransitionCause};
 use quadfrog::trial::{ExperimentStage, Verdict};
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -82,8 +82,9 @@ fn live(model: &Model) -> NextStep {
             let cause = &session.stopped_because;
             let review = session.stage_is(ExperimentStage::Review);
             let fell = session.under_review().is_some_and(|trial| trial.suggested == Some(Verdict::Fall));
-            // The cause of a fall stands beside its suggested verdict.
-            let because = match cause.is_empty() || mode == Mode::Damped && fell {
+            // The cause of a fall stands beside its suggested verdict; STOP says itself why.
+            let is_stop = *cause == TransitionCause::Stop.to_string();
+            let because = match cause.is_empty() || is_stop || mode == Mode::Damped && fell {
                 true => String::new(),
                 false => format!(": {cause}"),
             };
@@ -110,12 +111,16 @@ fn live(model: &Model) -> NextStep {
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
         mode @ (Mode::Disarmed | Mode::Ready) if finished => {
             let more = [(Action::Continue, "more trials"), (Action::ConfirmBest, "confirm best")];
-            let rest = if mode == Mode::Disarmed { [undo, quit] } else { [sit_down, undo] };
-            step("The study is finished.", model, &[&more[..], &[(Action::ExportBest, "export")], &rest].concat())
+            let end = if mode == Mode::Disarmed { quit } else { sit_down };
+            let rest = [(Action::ExportBest, "export"), undo];
+            step("The study is finished.", model, &[&[end], &more[..], &rest].concat())
         }
         Mode::Disarmed => {
             let lead = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
+                0 if model.simulated_robot_lies() => {
+                    format!("Press {} to arm: the simulator turns the robot upright, it stands up.", key(Action::Arm))
+                }
                 0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
                 1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
                 failing => {
@@ -229,7 +234,10 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Confirm(Question::Skip { trial, .. }) => {
             format!("Press y to skip trial #{trial}. Any other key cancels.")
         }
-        Dialog::Confirm(Question::AcceptAnyway { trial }) => {
+        Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Fall }) => {
+            format!("Press y to judge trial #{trial} a fall. Any other key cancels.")
+        }
+        Dialog::Confirm(Question::JudgeAnyway { trial, .. }) => {
             format!("Press y to accept trial #{trial}. Any other key cancels.")
         }
         Dialog::Confirm(Question::HandValue { .. }) => "Press y to use the value. Any other key cancels.".to_owned(),
@@ -238,6 +246,9 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
+        Dialog::Field { .. } if model.can_stop() && !model.space_bar_is_text() => {
+            "Enter confirms, Esc cancels. Space is STOP.".to_owned()
+        }
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),

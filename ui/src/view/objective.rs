@@ -4,7 +4,8 @@ use quadfrog::trial::{PredictedTrial, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 
-use super::draw::{cell_at, heading, number, sign};
+use super::draw::{cell_at, heading, heading_width, number, sign};
+use super::parameter_axes::LEAST_SPAN;
 use crate::model::session::SessionModel;
 use crate::model::trials::accepted_value;
 use crate::theme::{Role, Theme};
@@ -13,19 +14,28 @@ const SCALE: u16 = 6;
 /// Rows of the plot from which the numbers of the trials have one.
 const NUMBERS_FROM_ROWS: u16 = 6;
 
-/// Span of the vertical axis at least, m or rad.
-const LEAST_SPAN: f64 = 1e-3;
+/// The title of a panel with the objective upwards: `J (m) over f0`.
+pub fn objective_over(what: &str, unit: &str) -> String {
+    let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+    format!("J{unit} over {what}")
+}
 
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
     let aside = match session.trials.best_value() {
         Some((trial, value)) => {
             let model = if session.trials.model_best.is_some() { ", by the model" } else { "" };
-            format!("best {} {} #{trial}{model}", number(value), session.info.unit)
+            let by_hand = if session.trials.best_is_by_hand() { " by hand" } else { "" };
+            format!("best {} {}{by_hand} #{trial}{model}", number(value), session.info.unit)
         }
-        None => "no value yet".to_owned(),
+        None => "none accepted yet".to_owned(),
     };
-    let plot = heading(frame, area, theme, "J over trials", &aside);
+    let mut title = objective_over("trials", &session.info.unit);
+    if heading_width(&title, &aside) > usize::from(area.width) {
+        // The best value is worth more than the words.
+        title = title.trim_end_matches(" over trials").to_owned();
+    }
+    let plot = heading(frame, area, theme, &title, &aside);
     let numbers = u16::from(plot.height >= NUMBERS_FROM_ROWS);
     let [plot, trials] = Layout::vertical([Constraint::Fill(1), Constraint::Length(numbers)]).areas(plot);
     if plot.height < 2 || plot.width <= SCALE || session.trials.records.is_empty() {

@@ -7,7 +7,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::draw::{heading, scale, sign, span, with_deviation};
-use super::parameter_axes::ParameterAxes;
+use super::objective::objective_over;
+use super::parameter_axes::{LEAST_SPAN, ParameterAxes};
 use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -80,9 +81,9 @@ fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparis
 fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme, index: usize) {
     // The study's own bounds: past trials stay where they were when the search is narrowed.
     let info = &session.info.parameters[index];
-    let body = heading(frame, area, theme, &format!("J over {}", info.name), &info.unit);
+    let body = heading(frame, area, theme, &objective_over(&info.name, &session.info.unit), &info.unit);
     let values = || session.trials.records.values().filter_map(|trial| trial.value);
-    let (low, high) = (values().fold(0.0, f64::min), values().fold(1e-3, f64::max));
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(LEAST_SPAN, f64::max));
     let Some(axes) = ParameterAxes::new(info, body, (low, high)) else { return };
     let buffer = frame.buffer_mut();
     let proposed = session.open_proposal().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
@@ -106,8 +107,9 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
     let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
     let densities = session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| !p.at.is_empty()));
     let mut items = Vec::new();
+    let void = if area.width >= 100 { "void, without J" } else { "void" };
     for (verdict, text) in
-        [(Some(Verdict::Accept), "accept"), (Some(Verdict::Fall), "fall"), (Some(Verdict::Void), "void")]
+        [(Some(Verdict::Accept), "accept"), (Some(Verdict::Fall), "fall"), (Some(Verdict::Void), void)]
     {
         let (symbol, role) = sign(verdict);
         items.push((symbol, role, text));

@@ -6,11 +6,12 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, number, scale, span, truncate};
+use super::draw::{heading, number, scale, span};
 use crate::action::Action;
 use crate::legal::{legal, may_request};
 use crate::model::Model;
 use crate::theme::Role;
+use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
@@ -113,22 +114,24 @@ fn actions(model: &Model, width: usize) -> Vec<Line<'static>> {
     ];
     // A replay and an observer change nothing: one line says so for all.
     let commands = may_request(model);
+    let proposal = legal(Action::Override, model);
     let line = |(action, text): (Action, String)| {
         let key = model.keymap.key(action);
         match legal(action, model) {
             Err(_) if commands.is_err() => Line::from(span(theme, Role::Quiet, format!("  {key:<3}{text}"))),
             Ok(()) => Line::from(vec![span(theme, Role::Key, format!("  {key:<3}")), Span::raw(text)]),
-            Err(reason) => {
-                let text = truncate(&format!("  {key:<3}{text} ({reason})"), width);
-                Line::from(span(theme, Role::Quiet, text))
+            // What holds for the whole proposal is said once, below.
+            Err(reason) if Some(&reason) == proposal.as_ref().err() => {
+                Line::from(span(theme, Role::Quiet, format!("  {key:<3}{text}")))
             }
+            Err(reason) => Line::from(span(theme, Role::Quiet, format!("  {key:<3}{text} ({reason})"))),
         }
     };
     let mut lines: Vec<Line> = offered.into_iter().map(line).collect();
     if let Err(reason) = commands {
         lines.push(Line::from(span(theme, Role::Quiet, format!("  Nothing can be changed: {reason}."))));
-    } else if let Err(reason) = legal(Action::Override, model) {
+    } else if let Err(reason) = &proposal {
         lines.push(Line::from(span(theme, Role::Quiet, format!("  The proposal cannot be changed now: {reason}."))));
     }
-    lines
+    wrap_all(&lines, width, 5)
 }

@@ -11,6 +11,9 @@ use crate::theme::{Role, Theme};
 /// Columns of a vertical axis with its values.
 pub const AXIS: u16 = 7;
 
+/// Span of a vertical axis of values at least, m or rad. Falls alone have no scale.
+pub const LEAST_SPAN: f64 = 1e-3;
+
 /// Plot and axes over one parameter.
 pub struct ParameterAxes<'a> {
     pub info: &'a ParameterInfo,
@@ -49,7 +52,11 @@ impl<'a> ParameterAxes<'a> {
         let quiet = theme.style(Role::Quiet);
         let width = usize::from(AXIS) - 1;
         for (row, value) in [(plot.y, self.values.1), (plot.bottom() - 1, self.values.0)] {
-            let text = if value == 0.0 { "0".to_owned() } else { number(value) };
+            let text = match value {
+                0.0 => "0".to_owned(),
+                LEAST_SPAN => String::new(),
+                value => number(value),
+            };
             buffer.set_string(plot.x - AXIS, row, format!("{text:>width$.width$}"), quiet);
         }
         let (low, high) = (number(self.info.low), number(self.info.high));

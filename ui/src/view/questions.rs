@@ -1,7 +1,8 @@
 //! The texts of the questions: each says what follows, and Cancel is the default and comes first.
 
+use quadfrog::session::objective;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ProposedParameter, Verdict, six_digits};
+use quadfrog::trial::{ExperimentStage, ProposedParameter, Verdict, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{number, span};
@@ -92,8 +93,19 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
     if model.robot_is_energised() {
         lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
     }
-    if let Some(trial) = model.session.under_review() {
-        lines.push(Line::from(format!("Trial #{} has no verdict yet.", trial.trial)));
+    if let Some(row) = model.session.under_review() {
+        let by_hand = row.hand_value.is_some();
+        let one_of_several = model.session.proposal.as_ref().is_some_and(|proposal| proposal.repeats > 1);
+        let follows = match row.suggested {
+            Some(Verdict::Fall) if objective::tripped_limit(row) => "It counts as a fall, as suggested.",
+            Some(Verdict::Void) if !by_hand => "It is void, as suggested, and its parameters run again.",
+            _ if one_of_several => "This jump is done again when the study is continued.",
+            _ => "It keeps its measurement and waits until the study is continued (--resume).",
+        };
+        lines.push(Line::from(format!("Trial #{} has no verdict yet. {follows}", row.trial)));
+    } else if !model.session.stage_is(ExperimentStage::Finished) && model.session.stage.is_some() {
+        let (judged, budget) = (model.session.counted(), model.session.budget());
+        lines.push(Line::from(format!("{judged} of {budget} trials count so far; --resume continues the study.")));
     }
     lines.push(Line::default());
     lines.push(answers(&model.theme, "y", "quit"));
@@ -107,7 +119,18 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let answer = answers(&model.theme, "y", "skip");
             ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
         }
-        Question::AcceptAnyway { trial } => {
+        Question::JudgeAnyway { trial, verdict: Verdict::Fall } => {
+            let cause = model.session.not_to_accept().map_or("", |row| row.cause.as_str());
+            let lines = vec![
+                Line::from(format!("The suggested verdict of trial #{trial} is void: {cause}.")),
+                Line::from("Fall reports J = 0 to the optimizer, which then avoids these parameters."),
+                Line::from("Void hides the trial from it."),
+                Line::default(),
+                answers(&model.theme, "y", "fall"),
+            ];
+            ("Judge a void trial a fall?", lines)
+        }
+        Question::JudgeAnyway { trial, .. } => {
             let Some(row) = model.session.not_to_accept() else { return ("Accept?", Vec::new()) };
             let value = model.session.value_if_accepted(row);
             let unit = &model.session.info.unit;

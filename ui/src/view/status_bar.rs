@@ -82,13 +82,14 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
         let (finished, budget) = (model.session.counted(), model.session.budget());
         spans.push(Span::raw(match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
-            false => format!("   trial #{}   {finished} of {budget} judged", info.trial),
+            false => format!("   trial #{}   {finished} of {budget} count", info.trial),
         }));
     }
     if let Some((best, value)) = model.session.trials.best_value() {
         let before = spans.len();
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
-        spans.push(span(theme, Role::Good, format!("{} {}", number(value), session.unit)));
+        let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
+        spans.push(span(theme, Role::Good, format!("{} {}{by_hand}", number(value), session.unit)));
         spans.push(span(theme, Role::Quiet, format!(" (#{best})")));
         for kept in [before + 2, before] {
             if spans.iter().map(Span::width).sum::<usize>() > room {
@@ -122,7 +123,7 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
 
 /// The keys that stop now.
 fn stop_keys(model: &Model) -> String {
-    match model.space_bar_is_text_while_energised() {
+    match model.space_bar_is_text() {
         true => "F12 Ctrl-C".to_owned(),
         false => model.keymap.all_keys(Action::Stop),
     }
@@ -252,7 +253,7 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(message) = &model.message else { return };
     let role = match message.level {
-        LogLevel::Info | LogLevel::Warning if message.age_min(model.clock) > 0 => Role::Quiet,
+        LogLevel::Info | LogLevel::Warning if message.is_old(model.clock) => Role::Quiet,
         LogLevel::Info => Role::Text,
         LogLevel::Warning => Role::Warning,
         LogLevel::Error => Role::Bad,
@@ -275,7 +276,7 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),
     };
-    let lines = vec![
+    let mut lines = vec![
         Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),
         match model.can_stop() {
             true => Line::from(vec![span(theme, Role::Alarm, " STOP "), Span::raw(" "), span(theme, Role::Key, keys)]),
@@ -284,7 +285,9 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
         Line::from(link),
         Line::from(format!("terminal {}x{}", area.width, area.height)),
         Line::from(format!("needed {COMPACT_COLUMNS}x{COMPACT_ROWS}")),
-        Line::from(span(theme, Role::Quiet, "keys still work")),
+        Line::from(span(theme, Role::Quiet, "STOP works, no key arms or jumps")),
     ];
+    // What a key was answered, or refused for.
+    lines.extend(message_rows(model, area.width).into_iter().map(|row| row.style(theme.style(Role::Warning))));
     frame.render_widget(Paragraph::new(lines), area);
 }

@@ -18,7 +18,11 @@ use crate::theme::Role;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let later = model.later_trials().count();
-    let title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
+    let mut title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
+    let (rows, room) = (model.trial_rows().len(), usize::from(area.height).saturating_sub(2));
+    if rows > room {
+        title += &format!(", {room} of {rows} rows");
+    }
     let body = heading(frame, area, &model.theme, &title, &summary(model));
     render_table(frame, body, model, true);
 }
@@ -34,10 +38,10 @@ fn summary(model: &Model) -> String {
     let trials = &model.session.trials;
     let counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
     let view = &model.trial_table;
-    let shown = match (view.best_only, view.filter) {
-        (true, _) => "best only".to_owned(),
-        (false, Some(verdict)) => format!("only {}", verdict.name()),
-        (false, None) => "all".to_owned(),
+    let (shown, by_filter) = match (view.best_only, view.filter) {
+        (true, _) => ("best only".to_owned(), Action::BestOnly),
+        (false, Some(verdict)) => (format!("only {}", verdict.name()), Action::Filter),
+        (false, None) => ("all".to_owned(), Action::Filter),
     };
     let sort = match view.sort {
         SortBy::Number => "number",
@@ -47,7 +51,7 @@ fn summary(model: &Model) -> String {
         SortBy::Column(column) => column.name(),
     };
     let turned = if view.reversed { " reversed" } else { "" };
-    let [by, only, columns] = [Action::Sort, Action::Filter, Action::Columns].map(|action| model.keymap.key(action));
+    let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
     format!("{counts}; by {sort}{turned} ({by}), {shown} ({only}), columns ({columns})")
 }
 

@@ -230,8 +230,10 @@ fn run_one(
     let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
     let mut failed = None;
     // The rollouts of the best trial, and of the present one.
-    let mut best: Option<(f64, Vec<RecordedRollout>)> = None;
+    let mut best: Option<(u32, f64, Vec<RecordedRollout>)> = None;
     let mut present = Vec::new();
+    // The records of the newest verdict, with which a recording of one trial ends.
+    let mut newest = Vec::new();
     let ran = automatic::run_watched(&mut experiment, &mut rollout, |trial| {
         let JudgedTrial { experiment, row, warning, .. } = *trial;
         if row.verdict.is_some() {
@@ -251,23 +253,27 @@ fn run_one(
             RecordChoice::Best => {
                 present.push(RecordedRollout::of(trial));
                 if let Some(verdict) = row.verdict {
+                    newest = trial.after.to_vec();
                     let rollouts = std::mem::take(&mut present);
                     let value = row.value.filter(|_| verdict == Verdict::Accept);
-                    if let Some(value) = value.filter(|value| best.as_ref().is_none_or(|(best, _)| value > best)) {
-                        best = Some((value, rollouts));
+                    if let Some(value) = value.filter(|value| best.as_ref().is_none_or(|(_, best, _)| value > best)) {
+                        best = Some((row.trial, value, rollouts));
                     }
                 }
             }
         }
     });
     if let Some(mut recorder) = recorder {
-        let mut rollouts = best.iter().flat_map(|(_, rollouts)| rollouts);
-        let recorded = match failed {
-            None => rollouts.try_for_each(|rollout| recorder.rollout(rollout)),
-            Some(error) => Err(error),
+        let recorded = match (failed, &best) {
+            (Some(error), _) => Err(error),
+            (None, Some((trial, _, rollouts))) => {
+                let earlier = experiment.rows().filter(|row| row.trial < *trial);
+                recorder.rows(earlier).and_then(|()| rollouts.iter().try_for_each(|rollout| recorder.rollout(rollout)))
+            }
+            (None, None) => Ok(()),
         };
-        let last = experiment.take_records();
-        failed = recorded.and_then(|()| recorder.finish(&last, experiment.rows())).err();
+        newest.extend(experiment.take_records());
+        failed = recorded.and_then(|()| recorder.finish(&newest, experiment.rows())).err();
     }
     // A full disk fails the journal and the recording: the journal, with every verdict, is named first.
     if let Err(refusal) = ran {

@@ -77,6 +77,11 @@ impl StudyRecorder {
         self.records(&rollout.after)
     }
 
+    /// Adds rows of the trial table.
+    pub fn rows<'a>(&mut self, rows: impl Iterator<Item = &'a TrialRecord>) -> Result<(), EngineError> {
+        rows.into_iter().try_for_each(|row| self.record(Record::Trial(row.clone())))
+    }
+
     /// Adds the last records and the whole table, and completes the file.
     pub fn finish<'a>(
         mut self,
@@ -84,9 +89,7 @@ impl StudyRecorder {
         rows: impl Iterator<Item = &'a TrialRecord>,
     ) -> Result<(), EngineError> {
         self.records(records)?;
-        for row in rows {
-            self.record(Record::Trial(row.clone()))?;
-        }
+        self.rows(rows)?;
         let (finished, trouble) = self.writer.finish();
         finished?;
         Ok(trouble.map_or(Ok(()), Err)?)

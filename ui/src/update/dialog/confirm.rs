@@ -43,6 +43,10 @@ pub(super) fn approve_key(
         say(model, LogLevel::Warning, "not yet: type y first if the area is clear");
     }
     if area_asked || waited < APPROVAL_PAUSE {
+        if !area_asked {
+            let pause_s = APPROVAL_PAUSE.as_secs_f64();
+            say(model, LogLevel::Info, format!("too early: {key} again after {pause_s:.1} s without a press"));
+        }
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
     }
@@ -87,10 +91,12 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
     match question {
         Question::Skip { .. } if yes => request_if_legal(model, Action::Skip, OperatorRequest::Skip, "not skipped"),
         Question::Skip { .. } => cancelled(model, "not skipped"),
-        Question::AcceptAnyway { .. } if yes => {
-            request_if_legal(model, Action::Accept, OperatorRequest::Judge(Verdict::Accept), "not accepted")
+        Question::JudgeAnyway { verdict, .. } if yes => {
+            let action = if *verdict == Verdict::Fall { Action::Fall } else { Action::Accept };
+            request_if_legal(model, action, OperatorRequest::Judge(*verdict), "not judged")
         }
-        Question::AcceptAnyway { .. } => cancelled(model, "not accepted"),
+        Question::JudgeAnyway { verdict: Verdict::Fall, .. } => cancelled(model, "not judged a fall"),
+        Question::JudgeAnyway { .. } => cancelled(model, "not accepted"),
         Question::HandValue { value, .. } if yes => {
             request_if_legal(model, Action::HandValue, OperatorRequest::HandValue(Some(*value)), "not used")
         }

@@ -10,9 +10,9 @@ use crate::action::Action;
 use crate::keymap::Key;
 use crate::legal::palette;
 use crate::message::Effect;
-use crate::model::Model;
 use crate::model::dialog::{Choice, Dialog};
 use crate::model::live::Panel;
+use crate::model::{Model, View};
 use crate::update::navigate::move_by;
 use crate::update::request::{cancelled, request};
 
@@ -179,7 +179,9 @@ pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize
     };
     let trial = neighbour.map_or(trial, |(number, _)| *number);
     if matches!(key.code(), KeyCode::Up | KeyCode::Down) {
+        // Keys act on the shown trial: as on a row of Trials.
         model.trial_table.selected = Some(trial);
+        model.view = View::Trials;
     }
     model.dialog = Some(Dialog::Details { trial, scroll });
     Vec::new()

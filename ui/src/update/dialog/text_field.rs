@@ -5,6 +5,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::trial::six_digits;
 use tui_input::{Input, InputRequest};
 
+use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
@@ -106,6 +107,10 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             let number = text.parse::<u32>().map_err(|_| format!("`{text}` is not the number of a trial"))?;
             if model.trial(number).is_none() {
                 return Err(format!("there is no trial {number}"));
+            }
+            if !model.trial_rows().iter().any(|row| row.trial == number) {
+                let keys = [Action::Filter, Action::BestOnly].map(|action| model.keymap.key(action));
+                return Err(format!("the table leaves trial {number} out; {} and {} show others", keys[0], keys[1]));
             }
             model.trial_table.selected = Some(number);
             return Ok(Vec::new());
