@@ -137,8 +137,20 @@ fn a_lost_operator_costs_the_trial_but_nothing_else() {
     let player = Player::open(folder.path().join("session.mcap")).unwrap();
     assert_eq!(player.damage(), None);
 
-    // Nobody judged it: it is void, and its parameters come again.
     let mut again = Screen::new(start(folder.path(), None));
+    if row.suggested != Some(Verdict::Void) {
+        // It was measured: it waits for its verdict.
+        again.until("the review", |screen| {
+            let stage = |record: &Record| match record {
+                Record::Stage(info) => Some((info.stage, info.trial)),
+                _ => None,
+            };
+            screen.records.iter().rev().find_map(stage) == Some((ExperimentStage::Review, trial))
+        });
+        assert_eq!(again.row(trial).and_then(|kept| kept.suggested), row.suggested);
+        return;
+    }
+    // Not judged, it is void, and its parameters come again.
     let proposal = again.proposal();
     let values = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.value).collect::<Vec<_>>();
     assert_eq!(values(&proposal), values(&before));

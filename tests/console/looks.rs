@@ -165,7 +165,8 @@ fn the_program_takes_the_colours_for_the_background_that_the_terminal_reports() 
     session.send("\x1b]11;rgb:ffff/ffff/ffff\x1b\\2");
     session.wait_for(&["Press A to arm"]);
     session.wait_until("light colours", || session.sent(LIGHT_GREY));
-    session.wait_until("the key behind the report opened Trials", || !session.screen().contains("over trials"));
+    session
+        .wait_until("the key behind the report opened Trials", || !session.screen().contains("no judged trial near"));
     let before = session.bytes();
     session.send("W");
     session.wait_for(&["colours for a dark background"]);
@@ -174,7 +175,7 @@ fn the_program_takes_the_colours_for_the_background_that_the_terminal_reports() 
     let before = session.bytes();
     session.send("\x1b]11;rgb:ffff/ffff/ffff\x1b\\");
     session.send("1");
-    session.wait_for(&["over trials"]);
+    session.wait_for(&["no judged trial near"]);
     assert!(!session.sent_after(before, LIGHT_GREY));
     assert!(session.quit().success());
 }

@@ -274,6 +274,11 @@ impl Model {
         self.replay.is_none() && self.mode().energised()
     }
 
+    /// Whether a late tick matters: a simulated robot waits for it.
+    pub fn lateness_matters(&self) -> bool {
+        self.session.info.backend != Some(Backend::Simulator)
+    }
+
     /// Whether a simulated robot is tilted so far that arming turns it upright first.
     pub fn simulated_robot_lies(&self) -> bool {
         let tilt = self.snapshot.tick.estimate.roll_pitch_yaw.xy().amax();

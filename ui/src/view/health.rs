@@ -167,14 +167,19 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
         let [p50, p99] = [0.5, 0.99].map(|share| percentile(values, share) / 1e3);
         format!("p50 {p50:.0} us, p99 {p99:.0} us")
     };
+    let matters = model.lateness_matters();
     let worst_ms = counters.worst_lateness_ns as f64 / 1e6;
     let stages = &tick.stages;
     let [read, decide, write] = [stages.read_ns, stages.decide_ns, stages.write_ns].map(|ns| f64::from(ns) / 1e3);
     vec![
         detail("ticks", tick.number.to_string(), false),
-        row("late ticks", format!("{} ({:.3} %)", counters.late_ticks, share * 100.0), share > limits.late_share),
-        row("worst", format!("{worst_ms:.2} ms late"), worst_ms > limits.late_ms),
-        row("wake-up", micro(&late), percentile(&late, 0.99) > 5e5),
+        row(
+            "late ticks",
+            format!("{} ({:.3} %)", counters.late_ticks, share * 100.0),
+            matters && share > limits.late_share,
+        ),
+        row("worst", format!("{worst_ms:.2} ms late"), matters && worst_ms > limits.late_ms),
+        row("wake-up", micro(&late), matters && percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
         detail("stages, us", format!("read {read:.0}, decide {decide:.0}, write {write:.0}"), false),
     ]

@@ -131,7 +131,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// The landed trial over the whole width of a narrow terminal; its measured values and the table share the rows below.
 fn render_landed(frame: &mut Frame, area: Rect, model: &Model) {
-    let card_rows = model.session.trial_rows().min(area.height / 2);
+    let card_rows = model.session.trial_rows().max(proposal::rows(model, LANDED_SIDE)).min(area.height / 2);
     let [charts, lower] = Layout::vertical([Constraint::Fill(1), Constraint::Length(card_rows)]).areas(area);
     let [card, _, table] =
         Layout::horizontal([Constraint::Length(LANDED_SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);

@@ -12,6 +12,7 @@ use ratatui::widgets::Paragraph;
 use super::draw::{expectation, heading, number, scale, span, with_deviation};
 use super::points;
 use crate::action::Action;
+use crate::legal::legal;
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -21,6 +22,12 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let (title, lines) = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
     frame.render_widget(Paragraph::new(wrap_all(&lines, usize::from(body.width), 1)), body);
+}
+
+/// The rows that the whole panel takes with that many columns.
+pub fn rows(model: &Model, width: u16) -> u16 {
+    let lines = content(model, usize::from(width)).1;
+    1 + wrap_all(&lines, usize::from(width), 1).len() as u16
 }
 
 fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
@@ -180,7 +187,10 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         let (key, text) = (model.keymap.key(action), format!(" {text} "));
         [Span::raw(" "), span(theme, Role::Key, key), span(theme, Role::Quiet, text)]
     };
-    lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
+    let offers: Vec<_> = offers.into_iter().filter(|(action, _)| legal(*action, model).is_ok()).collect();
+    if !offers.is_empty() {
+        lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
+    }
     lines.extend(points::lines(session, theme, width));
     lines
 }

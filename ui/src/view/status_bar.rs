@@ -154,9 +154,7 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         true => format!("{} late", counters.late_ticks),
         false => format!("{} late, worst {:.1} ms", counters.late_ticks, counters.worst_lateness_ns as f64 / 1e6),
     };
-    // A simulated robot waits for its tick.
-    let waits = model.session.info.backend == Some(Backend::Simulator);
-    part("loop ", warning(late_share > limits.late_share && !waits), late);
+    part("loop ", warning(late_share > limits.late_share && model.lateness_matters()), late);
     match (counters.link, model.session.info.backend) {
         (_, None) => {}
         (None, Some(Backend::Simulator)) => part("link ", Role::Quiet, "none: SIM".to_owned()),

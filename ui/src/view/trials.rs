@@ -21,7 +21,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let mut title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
     let (rows, room) = (model.trial_rows().len(), usize::from(area.height).saturating_sub(2));
     if rows > room {
-        title += &format!(", {room} of {rows} rows");
+        title += &format!(" ({room} of {rows})");
     }
     let body = heading(frame, area, &model.theme, &title, &summary(model));
     render_table(frame, body, model, true);

@@ -88,6 +88,7 @@ impl StudyRecorder {
         records: &[Record],
         rows: impl Iterator<Item = &'a TrialRecord>,
     ) -> Result<(), EngineError> {
+        self.time_ns += TICK_NS;
         self.records(records)?;
         self.rows(rows)?;
         let (finished, trouble) = self.writer.finish();
