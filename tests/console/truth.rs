@@ -5,7 +5,7 @@ mod support;
 use quadfrog::recording::record::{ArmingCheckRecord, Record};
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick, TrialInhibit};
+use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TrialInhibit};
 use quadfrog::trial::{Backend, DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
@@ -219,4 +219,25 @@ fn a_study_of_falls_alone_has_no_scale_of_its_values() {
     assert!(screen.contains("none accepted yet") && !screen.contains("0.001"), "{screen}");
     console.press(&["3"]);
     assert!(!console.screen(80, 24).contains("0.001"), "{}", console.screen(80, 24));
+}
+
+/// Regression: a robot that lay on its back was only said to stand up, and the line had no room for the key of the help.
+#[test]
+fn the_step_before_arming_says_that_a_fallen_simulated_robot_is_turned_upright() {
+    let mut console = Console::proposed();
+    console.model.snapshot.tick.estimate.roll_pitch_yaw.x = 3.0;
+    let screen = console.screen(80, 24);
+    let last = screen.lines().last().unwrap();
+    assert_shows(last, &["Press A to arm: the robot is turned upright and stands up.", "o override"]);
+    let narrow = console.screen(60, 20);
+    assert_shows(&narrow, &["turned upright", "? help"]);
+}
+
+/// Regression: the card of a landed trial cut the cause of its suggested verdict at 80 columns.
+#[test]
+fn the_card_of_a_landed_trial_shows_the_whole_cause() {
+    let mut console = Console::review(Mode::Damped, Verdict::Fall);
+    let cause = FallCause::BodyContact.to_string();
+    console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Fall)) }));
+    assert_shows(&console.screen(80, 24), &["fall (a part", "ground)"]);
 }

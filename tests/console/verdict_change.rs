@@ -35,9 +35,7 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     session.wait_for(&["Trial #1"]);
     session.send("2");
     session.send("f");
-    session.wait_for(&["accept becomes fall. Why?"]);
-    session.send("too early\r");
-    session.wait_for(&["its verdict is the last one: undo takes it back"]);
+    session.wait_for(&["the verdict of trial 0 is the last one: u takes it back"]);
     // The verdict becomes final with the next decision.
     session.send("n");
     session.wait_for(&["Skip the proposal?"]);

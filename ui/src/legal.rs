@@ -271,6 +271,10 @@ fn may_judge(model: &Model, verdict: Verdict) -> Legality {
         return refuse("no trial waits for a verdict; in Trials, select a judged one to change it");
     };
     require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")?;
+    if model.session.undoable() == Some(trial) {
+        let undo = model.keymap.key(Action::Undo);
+        return refuse(format!("the verdict of trial {trial} is the last one: {undo} takes it back"));
+    }
     require(before != verdict, &format!("trial {trial} is {} already", verdict.name()))
 }
 
@@ -281,7 +285,7 @@ fn may_rerun(model: &Model) -> Legality {
     }
     match model.selected_trial() {
         Some(trial) if model.view == View::Trials && trial.verdict.is_some() => Ok(()),
-        _ => refuse("no trial waits for a verdict; in Trials, select a judged one"),
+        _ => refuse("no trial waits for a verdict; in Trials, select a judged one to run it again"),
     }
 }
 

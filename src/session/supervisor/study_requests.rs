@@ -72,7 +72,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Undo => {
             experiment.undo()?;
-            "the verdict is taken back".to_owned()
+            "it waits for another".to_owned()
         }
         OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
             let before = experiment.change_verdict(*trial, *verdict, reason)?;

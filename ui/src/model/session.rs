@@ -29,6 +29,8 @@ pub struct SessionModel {
     pub insight: Option<ProposalInsight>,
     pub trials: Trials,
     pub log: SessionLog,
+    /// The trial that was judged last.
+    pub last_judged: Option<u32>,
     /// Cause of the newest DAMPED or FAULT.
     pub stopped_because: String,
 }
@@ -60,6 +62,11 @@ impl SessionModel {
     /// The trial that waits for its verdict, if this one is suggested.
     pub fn suggested(&self, verdict: Verdict) -> Option<&TrialRecord> {
         self.under_review().filter(|trial| trial.suggested == Some(verdict))
+    }
+
+    /// The trial whose verdict can be taken back.
+    pub fn undoable(&self) -> Option<u32> {
+        self.last_judged.filter(|_| self.stage.is_some_and(|info| info.can_undo))
     }
 
     /// The proposal that waits for approval.

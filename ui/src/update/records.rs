@@ -124,6 +124,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             log_trial(model, time_ns, &trial);
             let number = trial.trial;
+            let waited = model.session.trials.records.get(&number).is_some_and(|before| before.verdict.is_none());
+            if waited && trial.verdict.is_some() {
+                model.session.last_judged = Some(number);
+            }
             model.session.trials.records.insert(number, trial);
             model.history.keep(model.session.trials.best().map(|best| best.trial));
             if model.session.stage.is_some_and(|now| (now.stage, now.trial) == (ExperimentStage::Running, number)) {

@@ -71,7 +71,7 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
     };
     let card_rows = match compared(model) {
         Some(comparison) => beside::rows(comparison).min(side.height),
-        None => model.session.trial_rows().min(side.height.saturating_sub(5)),
+        None => card_rows(model, side.width).min(side.height.saturating_sub(5)),
     };
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.
@@ -86,6 +86,11 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
             .areas(side);
     let picture = if model.live.panel == Panel::Robot { main } else { picture };
     Some(Places { main, gap, card, objective, picture: Some(picture).filter(|picture| picture.height > 0), table })
+}
+
+/// Rows of the card of a trial: equal over the stages of a study, more where the cause of a verdict needs them.
+fn card_rows(model: &Model, width: u16) -> u16 {
+    model.session.trial_rows().max(proposal::rows(model, width))
 }
 
 /// The trials side by side in place of the proposal: in a replay only, because a live session shows its proposal in any
@@ -131,7 +136,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// The landed trial over the whole width of a narrow terminal; its measured values and the table share the rows below.
 fn render_landed(frame: &mut Frame, area: Rect, model: &Model) {
-    let card_rows = model.session.trial_rows().max(proposal::rows(model, LANDED_SIDE)).min(area.height / 2);
+    let card_rows = card_rows(model, LANDED_SIDE).min(area.height / 2);
     let [charts, lower] = Layout::vertical([Constraint::Fill(1), Constraint::Length(card_rows)]).areas(area);
     let [card, _, table] =
         Layout::horizontal([Constraint::Length(LANDED_SIDE), Constraint::Length(1), Constraint::Fill(1)]).areas(lower);

@@ -1,7 +1,7 @@
 //! Drawing. Every panel is a free function of the part of the model that it draws; nothing here changes the model.
 //!
 //! ```text
-//!  READY      SIM  forward   trial #8   7 of 20 judged   best 0.642 m (#3)     REC 03:12  <- frame, never covered
+//!  READY      SIM  forward   trial #8   7 of 20 counted   best 0.642 m (#3)     REC 03:12  <- frame, never covered
 //!  STOP Space F12    loop 0 late, worst 0.1 ms    link 0 ms    motors 31 C
 //!  1 Live   2 Trials   3 Optimizer   4 Override   5 Health   6 Log        ? help : actions
 //! ┌─────────────────────────────────────────────────────────────────────────────────────┐

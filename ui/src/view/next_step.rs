@@ -119,7 +119,7 @@ fn live(model: &Model) -> NextStep {
             let lead = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
                 0 if model.simulated_robot_lies() => {
-                    format!("Press {} to arm: the simulator turns the robot upright, it stands up.", key(Action::Arm))
+                    format!("Press {} to arm: the robot is turned upright and stands up.", key(Action::Arm))
                 }
                 0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
                 1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
@@ -280,10 +280,12 @@ pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
         while shown.len() > 1 && width_of(&shown) + columns(&more) > room {
             shown.pop();
         }
-        shown.push(more);
-        while width_of(&shown) > room {
-            shown.pop();
+        if width_of(&shown) + columns(&more) <= room {
+            shown.push(more);
+        } else if width_of(&shown) > room {
+            shown = vec![more];
         }
+        shown.retain(|key| columns(key) <= room);
     }
     let lead = truncate(&next.lead, width.saturating_sub(1));
     let mut spans = vec![Span::raw(" "), span(theme, Role::Key, lead)];

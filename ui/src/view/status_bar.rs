@@ -82,7 +82,7 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
         let (finished, budget) = (model.session.counted(), model.session.budget());
         spans.push(Span::raw(match narrow {
             true => format!("  trial #{}  {finished}/{budget}", info.trial),
-            false => format!("   trial #{}   {finished} of {budget} count", info.trial),
+            false => format!("   trial #{}   {finished} of {budget} counted", info.trial),
         }));
     }
     if let Some((best, value)) = model.session.trials.best_value() {
