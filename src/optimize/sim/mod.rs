@@ -73,7 +73,7 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {
         let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
-        let worth = best.score > 0.0;
+        let worth = best.is_worth_the_risk();
         (best.point, worth)
     };
     let features = ensemble.features(prior.prior(), &unit);

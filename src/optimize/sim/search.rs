@@ -8,6 +8,7 @@ use crate::optimize::prior::Prior;
 use crate::optimize::prior::terms::{Ensemble, Features};
 use crate::optimize::sobol::Sobol;
 use libm::{exp, expm1, log, pow, sqrt};
+use std::cmp::Ordering;
 
 /// lambda: price of a fall, as a share of the incumbent's value.
 const PRICE: f64 = 0.1;
@@ -58,15 +59,45 @@ pub struct Acquisition<'a> {
     void: Vec<Vec<f64>>,
 }
 
+/// What speaks for a point, the weakest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Reason {
+    /// Not even that it stands: the surest is the best.
+    Unsure,
+    /// It stands, and its gain is not worth its risk: the one that may be the highest is the best.
+    Sure,
+    /// Its gain is worth its risk: U > 0.
+    Gain,
+}
+
+/// How good a point is: among points of one reason the larger merit.
+#[derive(Debug, Clone, Copy)]
+struct Score {
+    reason: Reason,
+    merit: f64,
+}
+
+impl Score {
+    fn cmp(&self, other: &Score) -> Ordering {
+        self.reason.cmp(&other.reason).then(self.merit.total_cmp(&other.merit))
+    }
+}
+
 /// A candidate that was scored.
 #[derive(Debug, Clone)]
 pub struct Scored {
     /// The point, in the prior's unit cube.
     pub point: Vec<f64>,
-    /// Larger is better; above 0 the gain is worth its risk.
-    pub score: f64,
+    score: Score,
     /// PointPrediction there.
     pub prediction: PointPrediction,
+}
+
+impl Scored {
+    /// Whether the gain is worth the risk of a fall.
+    pub fn is_worth_the_risk(&self) -> bool {
+        self.score.reason == Reason::Gain
+    }
 }
 
 impl<'a> Acquisition<'a> {
@@ -103,27 +134,26 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
     }
 
-    /// U = P EI - lambda 3^c J* (1 - P); before the first jump that stood the gain is J itself. Where U <= 0 the score is negative:
-    /// the gain among the sure points, else the surest first. Near void points it is reduced.
+    /// U = P EI - lambda 3^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points with U <= 0 the one
+    /// of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that stands makes points beyond it
+    /// sure. Of the others the surest is the best. Near void points the merit is reduced.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
         let prediction = self.predict(x, features);
         let PointPrediction { mean, variance, p_stand } = prediction;
+        let deviation = sqrt(variance);
         let gain = match self.incumbent {
             None => (mean - self.origin).max(0.0),
-            Some(incumbent) => {
-                let deviation = sqrt(variance);
-                exp(log(deviation) + log_improvement((mean - incumbent) / deviation))
-            }
+            Some(incumbent) => exp(log(deviation) + log_improvement((mean - incumbent) / deviation)),
         };
         let utility = p_stand * gain - PRICE * self.escalation * self.star * (1.0 - p_stand);
-        let away = self.away_from_void(x);
-        let score = if utility > 0.0 {
-            utility * away
+        let (reason, merit) = if utility > 0.0 {
+            (Reason::Gain, utility)
         } else if p_stand >= SURE {
-            -1.0 / (1.0 + p_stand * gain * away)
+            (Reason::Sure, (mean + deviation - self.origin).max(0.0))
         } else {
-            p_stand * away - 3.0
+            (Reason::Unsure, p_stand)
         };
+        let score = Score { reason, merit: merit * self.away_from_void(x) };
         Scored { point: x.to_vec(), score, prediction }
     }
 
@@ -146,7 +176,7 @@ impl<'a> Acquisition<'a> {
     ) -> Option<Scored> {
         let scatter = Sobol::new(bounds.len(), &mut streams.model);
         let mut ranked: Vec<Scored> = candidates.iter().map(|(x, features)| self.score(x, features)).collect();
-        ranked.sort_by(|a, b| b.score.total_cmp(&a.score));
+        ranked.sort_by(|a, b| b.score.cmp(&a.score));
         ranked.truncate(CENTRES);
         let mut best = ranked.first()?.clone();
         let mut centres = ranked;
@@ -162,8 +192,8 @@ impl<'a> Acquisition<'a> {
                 self.score(&x, &features)
             };
             let mut scored: Vec<Scored> = (0..LOCAL).map(around).collect();
-            scored.sort_by(|a, b| b.score.total_cmp(&a.score));
-            if scored[0].score > best.score {
+            scored.sort_by(|a, b| b.score.cmp(&a.score));
+            if scored[0].score.cmp(&best.score).is_gt() {
                 best = scored[0].clone();
             }
             centres = std::iter::once(best.clone()).chain(scored.into_iter().take(2)).collect();
