@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// Field: name, type of a nested message or nothing, comment.
 type Field = (&'static str, &'static str, &'static str);
 
-const MESSAGES: &[(&str, &[Field])] = include!(concat!(env!("OUT_DIR"), "/frog.v1.comments.rs"));
+const MESSAGES: &[(&str, &[Field])] = include!("../../proto/generated/comments.rs");
 
 /// Deepest nesting of messages; the file has three levels.
 const DEEPEST: usize = 5;

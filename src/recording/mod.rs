@@ -34,11 +34,8 @@ pub mod writer;
 
 pub use error::RecordingError;
 
-/// The messages of a recording as a page of Markdown, made from `proto/frog.proto`: `docs/reference/messages.md`.
-pub const MESSAGES_PAGE: &str = include_str!(concat!(env!("OUT_DIR"), "/messages.md"));
-
-/// The messages of `proto/frog.proto` as Rust types.
+/// The messages of `proto/frog.proto` as Rust types, made by `tests/messages.rs`.
 #[allow(missing_docs, clippy::all, reason = "generated; proto/frog.proto documents the fields")]
 mod frog {
-    include!(concat!(env!("OUT_DIR"), "/frog.v1.rs"));
+    include!("../../proto/generated/messages.rs");
 }

@@ -5,7 +5,7 @@ use foxglove::{Encode, Schema};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// Schema of each message of `proto/frog.proto`: its descriptor with those of the messages that it refers to.
-const SCHEMAS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/frog.v1.schemas.rs"));
+const SCHEMAS: &[(&str, &[u8])] = include!("../../proto/generated/schemas.rs");
 
 /// A topic. Its order is that of the channels in files written here; readers use the name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, EnumString, IntoStaticStr, VariantArray)]

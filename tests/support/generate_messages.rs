@@ -1,34 +1,45 @@
-//! Compiles `proto/frog.proto` to Rust types, to the descriptor that a recording carries, and to its page of documentation.
-
-use std::path::PathBuf;
+//! Compiles `proto/frog.proto` to Rust types, to the descriptors that a recording carries, and to its page of documentation.
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, EnumDescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("cargo::rerun-if-changed=proto");
-    let out = PathBuf::from(std::env::var("OUT_DIR")?);
-    let mut descriptors = protox::compile(["frog.proto"], ["proto"])?;
-    std::fs::write(out.join("frog.v1.comments.rs"), comments(&descriptors.file[0]))?;
-    std::fs::write(out.join("messages.md"), Page { file: &descriptors.file[0] }.text())?;
-    let mut config = prost_build::Config::new();
-    // A tick by the names of its fields, for `quadfrog verify`.
-    for message in ["ControlTick", "Battery", "Truth", "JointCommand", "FaultTicks.Whole"] {
-        config.message_attribute(format!(".frog.v1.{message}"), "#[derive(serde::Serialize)]");
-    }
-    config.compile_fds(descriptors.clone())?;
+/// Files made from `proto/frog.proto`, by their path in the repository.
+pub fn files() -> [(&'static str, String); 4] {
+    let proto = concat!(env!("CARGO_MANIFEST_DIR"), "/proto");
+    let mut descriptors = protox::compile(["frog.proto"], [proto]).unwrap();
+    let comments = comments(&descriptors.file[0]);
+    let page = Page { file: &descriptors.file[0] }.text();
+    let types = types(&descriptors);
     // The schema of a topic in a recording: without comments it has a third of the length.
     for file in &mut descriptors.file {
         file.source_code_info = None;
     }
-    let names = descriptors.file[0].message_type.iter().map(|message| message.name().to_owned());
+    let names = descriptors.file[0].message_type.iter().map(|message| message.name());
     let schemas = names.map(|name| {
-        let schema = reduced(&descriptors, &name).encode_to_vec();
-        format!("({name:?}, &{schema:?})")
+        let schema = reduced(&descriptors, name).encode_to_vec();
+        format!("({name:?}, b\"{}\")", schema.escape_ascii())
     });
-    std::fs::write(out.join("frog.v1.schemas.rs"), format!("&[{}]", schemas.collect::<Vec<_>>().join(",\n")))?;
-    Ok(())
+    let schemas = format!("&[\n{}\n]\n", schemas.collect::<Vec<_>>().join(",\n"));
+    [
+        ("proto/generated/messages.rs", types),
+        ("proto/generated/comments.rs", comments),
+        ("proto/generated/schemas.rs", schemas),
+        ("docs/reference/messages.md", page),
+    ]
+}
+
+/// Returns the messages as Rust types.
+fn types(descriptors: &FileDescriptorSet) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = prost_build::Config::new();
+    config.out_dir(folder.path());
+    // A tick by the names of its fields, for `quadfrog verify`.
+    for message in ["ControlTick", "Battery", "Truth", "JointCommand", "FaultTicks.Whole"] {
+        config.message_attribute(format!(".frog.v1.{message}"), "#[derive(serde::Serialize)]");
+    }
+    config.compile_fds(descriptors.clone()).unwrap();
+    std::fs::read_to_string(folder.path().join("frog.v1.rs")).unwrap()
 }
 
 /// Returns the descriptors with the message of that name and those that it refers to alone.
@@ -82,7 +93,7 @@ fn comments(file: &FileDescriptorProto) -> String {
         let fields: Vec<_> = (0..).zip(&message.field).map(field).collect();
         format!("({name:?}, &[{}])", fields.join(", "))
     });
-    format!("&[{}]", rows.collect::<Vec<_>>().join(",\n"))
+    format!("&[\n{}\n]\n", rows.collect::<Vec<_>>().join(",\n"))
 }
 
 /// `docs/reference/messages.md`: the messages as tables of Markdown. Paths are those of `descriptor.proto`.
@@ -103,7 +114,7 @@ impl Page<'_> {
         let [about, _] = self.comments(&[12]);
         let mut page = String::from(
             "# Messages of a recording\n\n\
-             Made from `proto/frog.proto` by the build of the engine; `QUADFROG_WRITE=1 cargo test --test messages_page` writes it.\n\
+             Made from `proto/frog.proto`; `QUADFROG_WRITE=1 cargo test --test messages` writes it.\n\
              `recordings/README.md` describes the container, its topics and its attachments; each recording has this file inside.\n",
         );
         page += &format!("\n{}\n", about.lines().map(str::trim).collect::<Vec<_>>().join("\n"));

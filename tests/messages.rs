@@ -1,21 +1,29 @@
-//! The page on the messages of a recording is that of `proto/frog.proto`.
+//! What is made from `proto/frog.proto` is kept in the repository, so that a build of the program needs no protobuf compiler.
+
+#[path = "support/generate_messages.rs"]
+mod generate_messages;
 
 use std::fs;
 use std::path::Path;
 
-use quadfrog::recording::MESSAGES_PAGE;
-
-/// `QUADFROG_WRITE=1` writes the page instead.
+/// `QUADFROG_WRITE=1` writes the files instead.
 #[test]
-fn the_page_of_messages_is_up_to_date() {
+fn the_types_the_schemas_and_the_page_of_messages_are_up_to_date() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let file = root.join("docs/reference/messages.md");
-    if std::env::var_os("QUADFROG_WRITE").is_some() {
-        fs::write(&file, MESSAGES_PAGE).unwrap();
+    for (path, made) in generate_messages::files() {
+        let file = root.join(path);
+        if std::env::var_os("QUADFROG_WRITE").is_some() {
+            fs::write(&file, &made).unwrap();
+        }
+        let kept = fs::read_to_string(&file).unwrap_or_default();
+        assert!(kept == made, "{path} is not that of proto/frog.proto: QUADFROG_WRITE=1 cargo test --test messages");
     }
-    let page = fs::read_to_string(&file).unwrap_or_default();
-    assert!(page == MESSAGES_PAGE, "QUADFROG_WRITE=1 cargo test --test messages_page");
-    // Every field and every value of an enum is in it, with its number and its comment.
+}
+
+#[test]
+fn the_page_of_messages_has_every_field_and_its_comment() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = fs::read_to_string(root.join("docs/reference/messages.md")).unwrap();
     let source = fs::read_to_string(root.join("proto/frog.proto")).unwrap();
     let mut rows = 0;
     for line in source.lines().map(str::trim).filter(|line| !line.starts_with("//")) {
