@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use quadfrog::config::Config;
+use quadfrog::config::{Config, ConfigError, write_new_files};
 use quadfrog::engine::{Options, attachments, fingerprint, newest_config, open_experiment, prepare_folder};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::robot::description::RobotDescription;
@@ -73,6 +73,60 @@ fn a_study_keeps_the_robots_files_as_a_model_and_an_old_study_without_them_opens
     assert_eq!(open_experiment(&again, Durability::Buffered, "").unwrap().budget(), 3);
     assert_eq!(kept(3), other);
     Config::load(Some(&newest_config(&study).unwrap().1)).unwrap();
+}
+
+/// Regression: a configuration that a full disk or a kill had cut was taken for the one that ran last, with built-in limits in place
+/// of those of the study.
+#[test]
+fn a_cut_configuration_is_not_the_one_that_ran_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    drop(prepare_folder(&options(robot(TOML, URDF), &study)).unwrap());
+    // The session was killed while it kept another one.
+    fs::create_dir(study.join(".config-2.part")).unwrap();
+    fs::write(study.join(".config-2.part/safety.toml"), "").unwrap();
+    assert_eq!(newest_config(&study).unwrap().1, study.join("config"));
+    let other = robot(&changed(TOML, "foot_force_n = 1.0", "foot_force_n = 0.05"), URDF);
+    drop(prepare_folder(&options(other, &study)).unwrap());
+    let (number, newest) = newest_config(&study).unwrap();
+    assert_eq!((number, study.join(".config-2.part").exists()), (2, false));
+    // As an earlier version left it on a full disk.
+    fs::write(newest.join("safety.toml"), "").unwrap();
+    let refusal = Config::load(Some(&newest)).unwrap_err().to_string();
+    assert!(refusal.contains("config-2/safety.toml: is empty"), "{refusal}");
+}
+
+#[test]
+fn new_files_are_written_whole_or_not_at_all_and_replace_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let new = folder.path().join("new");
+    let unwritable = [("a.toml", "x = 1"), ("b\0.toml", "y = 2")];
+    let entries = |folder: &Path| fs::read_dir(folder).unwrap().count();
+    assert!(matches!(write_new_files(&new, &unwritable), Err(ConfigError::Write { .. })));
+    assert_eq!(entries(folder.path()), 0, "no folder, no part of it");
+    fs::create_dir(&new).unwrap();
+    assert!(matches!(write_new_files(&new, &unwritable), Err(ConfigError::Write { .. })));
+    assert_eq!(entries(&new), 0);
+    let files = [("a.toml", "x = 1"), ("robot/b.toml", "y = 2")];
+    write_new_files(&new, &files).unwrap();
+    assert!(matches!(write_new_files(&new, &[("a.toml", "x = 3")]), Err(ConfigError::Exists { .. })));
+    assert_eq!(fs::read_to_string(new.join("a.toml")).unwrap(), "x = 1");
+    assert_eq!(fs::read_to_string(new.join("robot/b.toml")).unwrap(), "y = 2");
+}
+
+/// Regression: a lock that was a link had the file to which it leads emptied; one that was a pipe was waited for without end.
+#[test]
+fn a_lock_that_is_no_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let lock = folder.path().join("session.lock");
+    fs::write(folder.path().join("other"), "kept").unwrap();
+    let refused = || prepare_folder(&options(robot(TOML, URDF), folder.path())).err().unwrap().to_string();
+    std::os::unix::fs::symlink("other", &lock).unwrap();
+    assert!(refused().contains("session.lock"), "{}", refused());
+    assert_eq!(fs::read_to_string(folder.path().join("other")).unwrap(), "kept");
+    fs::remove_file(&lock).unwrap();
+    nix::unistd::mkfifo(&lock, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    assert!(refused().contains("session.lock"), "{}", refused());
 }
 
 #[test]

@@ -1,12 +1,10 @@
 //! Export of the configuration with a found point, as a folder for `--config`.
 
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{Config, ConfigError};
+use super::{Config, ConfigError, write_new_files};
 use crate::trial::Task;
 
 impl Config {
@@ -15,7 +13,7 @@ impl Config {
     /// only. Returns the written files.
     ///
     /// # Errors
-    /// [`ConfigError::Write`] when a file exists already or cannot be written: nothing is overwritten.
+    /// As of [`write_new_files`]: nothing is overwritten.
     pub fn export(
         &self,
         folder: &Path,
@@ -23,26 +21,14 @@ impl Config {
         point: &[(String, f64)],
         gains: &[(String, f64)],
     ) -> Result<Vec<PathBuf>, ConfigError> {
-        let write = |path: &Path| {
-            let path = path.to_owned();
-            move |source| ConfigError::Write { path, source }
-        };
-        std::fs::create_dir_all(folder).map_err(write(folder))?;
-        let paths: Vec<PathBuf> = self.as_run.iter().map(|(name, _)| folder.join(name)).collect();
-        if let Some(path) = paths.iter().find(|path| path.exists()) {
-            return Err(ConfigError::Write { path: path.clone(), source: std::io::ErrorKind::AlreadyExists.into() });
-        }
         let gains: Vec<_> = gains.iter().filter(|(name, _)| !self.optimizes(task, name)).cloned().collect();
-        for ((name, text), path) in self.as_run.iter().zip(&paths) {
-            let text = match name.as_str() {
-                "optimize.toml" => with(text, &["first", task.name()], point),
-                "control.toml" => with(text, &["tasks", task.name()], &gains),
-                _ => text.clone(),
-            };
-            let mut file = OpenOptions::new().write(true).create_new(true).open(path).map_err(write(path))?;
-            file.write_all(text.as_bytes()).map_err(write(path))?;
-        }
-        Ok(paths)
+        let changed = |(name, text): &(String, String)| match name.as_str() {
+            "optimize.toml" => with(text, &["first", task.name()], point),
+            "control.toml" => with(text, &["tasks", task.name()], &gains),
+            _ => text.clone(),
+        };
+        let files: Vec<_> = self.as_run.iter().map(|file| (&file.0, changed(file))).collect();
+        write_new_files(folder, &files)
     }
 }
 

@@ -7,6 +7,7 @@ mod export;
 mod files;
 mod kneeling;
 mod merge;
+mod new_files;
 mod ranges;
 mod reference;
 mod rules;
@@ -14,6 +15,7 @@ mod rules;
 pub use crate::sim::ranges::NumberRange;
 pub use checked::{Config, ConfigLayer};
 pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
+pub use new_files::write_new_files;
 pub use reference::{FileReference, KeyReference, SectionReference, range_of, reference};
 
 use std::path::PathBuf;
@@ -28,7 +30,11 @@ pub enum ConfigError {
     UnknownFile { path: PathBuf, known: String },
     #[error("{}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{}: cannot be written: {source}; give a new folder", path.display())]
+    #[error("{}: is empty, as after a full disk; remove it, or write the keys that differ into it", path.display())]
+    Empty { path: PathBuf },
+    #[error("{}: exists already; give a new folder, or remove the file first", path.display())]
+    Exists { path: PathBuf },
+    #[error("{}: cannot be written: {source}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}: {message}")]
     Syntax { file: String, line: usize, message: String },

@@ -2,12 +2,13 @@
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 use super::options::{EngineError, Options};
-use crate::config::Config;
+use crate::config::{Config, ConfigError, write_new_files};
 use crate::recording::session_files::next_recording;
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{RobotDescription, read_text};
 
 /// Name of the study's journal in its folder.
 pub const STUDY_FILE: &str = "study.log";
@@ -41,7 +42,8 @@ fn lock_folder(folder: &Path) -> Result<File, EngineError> {
         move |source| EngineError::System { what, source }
     };
     // Not truncated: it names its owner until it is locked.
-    let mut lock = OpenOptions::new().write(true).create(true).truncate(false).open(&path).map_err(system("made"))?;
+    let mut lock =
+        open_lock(OpenOptions::new().write(true).create(true).truncate(false), &path).map_err(system("made"))?;
     match lock.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
@@ -55,11 +57,18 @@ fn lock_folder(folder: &Path) -> Result<File, EngineError> {
     Ok(lock)
 }
 
+/// Opens a lock; a link would name another file, and a pipe would wait for its other end.
+fn open_lock(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+    let lock = options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path)?;
+    if lock.metadata()?.is_file() { Ok(lock) } else { Err(io::Error::other("it is not a regular file")) }
+}
+
 /// Returns the owner that a lock names; a lock of an older version names none.
 fn lock_owner(path: &Path) -> String {
     let mut text = Vec::new();
     // What cannot be read names no owner.
-    let _ = File::open(path).and_then(|lock| lock.take(OWNER_BYTES).read_to_end(&mut text));
+    let _ =
+        open_lock(OpenOptions::new().read(true), path).and_then(|lock| lock.take(OWNER_BYTES).read_to_end(&mut text));
     let text = String::from_utf8_lossy(&text);
     let line = text.lines().next().unwrap_or_default();
     if line.is_empty() { "a process that is not known".to_owned() } else { line.to_owned() }
@@ -72,7 +81,7 @@ fn lock_owner(path: &Path) -> String {
 /// When the lock cannot be opened or asked.
 pub fn running_session(folder: &Path) -> io::Result<Option<String>> {
     let path = folder.join(LOCK_FILE);
-    let lock = match File::open(&path) {
+    let lock = match open_lock(OpenOptions::new().read(true), &path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         lock => lock?,
     };
@@ -95,28 +104,19 @@ pub struct LockedFolder {
 /// highest number is the configuration that ran last. The robot's files are in the folder `robot` in it, a folder for
 /// `--model`. A session before that kept none, as of older versions, counts as another one.
 fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
-    let system = |what: String| move |source| EngineError::System { what, source };
     let files = kept_files(options);
     let config = match newest_config(folder) {
         None => folder.join("config"),
         Some((number, newest)) => {
-            let same = |(name, text): &(PathBuf, &str)| {
-                std::fs::read_to_string(newest.join(name)).is_ok_and(|kept| kept == *text)
-            };
+            let same = |(name, text): &(PathBuf, &str)| read_text(&newest.join(name)).is_ok_and(|kept| kept == *text);
             if files.iter().all(same) {
                 return Ok(());
             }
-            folder.join(format!("config-{}", number + 1))
+            let next = number.checked_add(1).ok_or(ConfigError::Exists { path: newest })?;
+            folder.join(format!("config-{next}"))
         }
     };
-    std::fs::create_dir(&config).map_err(system(format!("{}: cannot be made", config.display())))?;
-    let robot = config.join(ROBOT_FOLDER);
-    std::fs::create_dir(&robot).map_err(system(format!("{}: cannot be made", robot.display())))?;
-    for (name, text) in files {
-        let path = config.join(name);
-        std::fs::write(&path, text).map_err(system(format!("{}: cannot be written", path.display())))?;
-    }
-    Ok(())
+    Ok(write_new_files(&config, &files).map(drop)?)
 }
 
 /// Returns the files of the configuration and of the robot by their path in the kept folder.

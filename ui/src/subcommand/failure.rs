@@ -31,7 +31,7 @@ impl Failure {
 
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Failure {
-        Failure::input(error)
+        EngineError::from(error).into()
     }
 }
 
@@ -39,6 +39,7 @@ impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Failure {
         match &error {
             EngineError::System { .. }
+            | EngineError::Config(ConfigError::Write { .. })
             | EngineError::Study(StudyError::Journal(
                 JournalError::Io { .. }
                 | JournalError::Redis { .. }

@@ -1,12 +1,9 @@
 //! `quadfrog init`: a folder for a new robot, made from its URDF.
 
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::Args;
-use quadfrog::config::Config;
+use quadfrog::config::{Config, write_new_files};
 use quadfrog::robot::description::{Draft, read_text};
 use quadfrog::trial::{Backend, Task};
 use quadfrog_console::put_line;
@@ -38,13 +35,8 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let name = name.clone().or_else(of_folder).unwrap_or_else(|| "robot".to_owned());
     let draft = Draft::of_urdf(&name, urdf, &text).map_err(Failure::input)?;
     let urdf_name = urdf.file_name().unwrap_or_default();
-    let files = [(folder.join("robot.toml"), &draft.toml), (folder.join(urdf_name), &text)];
-    if let Some((path, _)) = files.iter().find(|(path, _)| path.exists()) {
-        return Err(Failure::input(format!("{}: exists already; give a new folder", path.display())));
-    }
-    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    for (path, text) in &files {
-        write_new(path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+    let files = [(Path::new("robot.toml"), &draft.toml), (Path::new(urdf_name), &text)];
+    for path in write_new_files(folder, &files)? {
         put_line!("{}", path.display());
     }
     let robot = &draft.robot;
@@ -73,8 +65,4 @@ fn fitness(config: &Config, draft: &Draft, task: Task) -> String {
         Ok(_) => "the stance is in reach".to_owned(),
         Err(error) => error.to_string(),
     }
-}
-
-fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
-    OpenOptions::new().write(true).create_new(true).open(path)?.write_all(text.as_bytes())
 }

@@ -3,14 +3,12 @@
 mod page;
 mod schema;
 
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use clap_complete::ArgValueCandidates;
-use quadfrog::config::{Config, reference};
+use quadfrog::config::{Config, reference, write_new_files};
 use quadfrog::trial::{Backend, Task};
 use quadfrog_console::{output, put_line};
 use toml::{Table, Value};
@@ -192,15 +190,8 @@ fn init(folder: Option<&Path>) -> Result<(), Failure> {
     let remedy = || Failure::input("HOME and XDG_CONFIG_HOME are not set to absolute paths; give a folder");
     let folder = folder.map(Path::to_owned).or_else(user_folder).ok_or_else(remedy)?;
     let files = reference();
-    let paths: Vec<_> = files.iter().map(|file| folder.join(file.name)).collect();
-    if let Some(path) = paths.iter().find(|path| path.exists()) {
-        let message = format!("{}: exists already; give a new folder, or remove the file first", path.display());
-        return Err(Failure::input(message));
-    }
-    std::fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    for (file, path) in files.iter().zip(&paths) {
-        let write = || OpenOptions::new().write(true).create_new(true).open(path)?.write_all(file.text.as_bytes());
-        write().with_context(|| format!("{}: cannot be written", path.display()))?;
+    let files: Vec<_> = files.iter().map(|file| (file.name, file.text)).collect();
+    for path in write_new_files(&folder, &files)? {
         put_line!("{}", path.display());
     }
     put_line!("Keys that are left out have their built-in values: a file may be cut to the keys that differ.");
