@@ -12,7 +12,10 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::session::automatic;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
+use quadfrog::session::rollout::Rollout;
+use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::TrialEnd;
 use quadfrog::trial::{Backend, HopEnvelope, ParameterInfo, Task, Verdict};
 use support::{BOUNDS, accept, plan, run, study};
@@ -50,8 +53,40 @@ fn a_simulated_study_is_continued_on_hardware_by_the_flag_alone() {
     drop(experiment);
     open(&hardware).expect("accepted before");
     // And back: what the simulator adds is of another machine again.
-    open(&options(folder.path(), Backend::Simulator)).unwrap();
+    let simulated = options(folder.path(), Backend::Simulator);
+    let refusal = open(&simulated).err().unwrap().to_string();
+    assert!(refusal.contains("made on hardware (go1), this session runs on sim (go1)"), "{refusal}");
+    open(&Options { accept_backend_change: true, ..simulated }).unwrap();
     assert!(matches!(open(&hardware), Err(EngineError::OtherBackend { .. })));
+}
+
+/// Regression: `quadfrog optimize --resume` accepted the jump of a robot that waited for its verdict, and so widened the hop envelope.
+#[test]
+fn a_jump_of_the_robot_waits_for_a_person_in_a_session_of_the_simulator() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut measured = open(&options(folder.path(), Backend::Hardware)).unwrap();
+    run(&mut measured, TrialEnd::Settled);
+    assert_eq!(measured.verdict_without_person(), Some(Verdict::Accept), "on the robot itself");
+    drop(measured);
+    let simulated = Options { accept_backend_change: true, ..options(folder.path(), Backend::Simulator) };
+    let mut experiment = open(&simulated).unwrap();
+    assert_eq!(experiment.under_review().map(|row| row.suggested), Some(Some(Verdict::Accept)));
+    assert_eq!(experiment.verdict_without_person(), None);
+    let settings = simulated.config.settings(&simulated.robot, Task::Forward, Backend::Simulator).unwrap();
+    let simulator = Simulator::new(&simulated.robot, &SimConfig::default()).unwrap();
+    let refusal = automatic::run(&mut experiment, &mut Rollout::new(simulator, &settings), |_, _| {}).unwrap_err();
+    assert!(refusal.to_string().contains("trial 0 waits for the verdict of a person"), "{refusal}");
+    assert!(experiment.under_review().is_some_and(|row| row.verdict.is_none()));
+}
+
+/// Regression: a trial without a measurement but with a value by hand was judged void without a person.
+#[test]
+fn a_value_by_hand_waits_for_a_person() {
+    let mut experiment = support::experiment(9);
+    run(&mut experiment, TrialEnd::Settled);
+    assert_eq!(experiment.verdict_without_person(), Some(Verdict::Accept));
+    experiment.set_hand_value(Some(0.25)).unwrap();
+    assert_eq!(experiment.verdict_without_person(), None);
 }
 
 #[test]

@@ -121,8 +121,8 @@ fn made_on(attributes: &StudyAttributes) -> &str {
     Backend::from_str(made).map_or(made, |backend| backend.name())
 }
 
-/// Refuses to continue on hardware a study that was made or continued on another backend or robot, unless the options accept
-/// it: its points and its verdicts are those of another machine.
+/// Refuses to continue a study that was made or continued on another backend, or on hardware on another robot, unless the
+/// options accept it: its points and its verdicts are those of another machine.
 ///
 /// # Errors
 /// When it is one, or the study cannot be read.
@@ -134,7 +134,7 @@ pub fn check_backend(options: &Options) -> Result<(), EngineError> {
         Storage::File(file) => file.is_file(),
         Storage::Redis(_) => true,
     };
-    if options.backend != Backend::Hardware || options.accept_backend_change || !exists {
+    if options.accept_backend_change || !exists {
         return Ok(());
     }
     let journal = storage.journal(Durability::Buffered).map_err(StudyError::from)?;
@@ -142,7 +142,8 @@ pub fn check_backend(options: &Options) -> Result<(), EngineError> {
     let Some(study) = journal.state().find(&name) else { return Ok(()) };
     let attributes = StudyAttributes::of(&journal.state().studies()[study].user_attributes);
     let (made, robot) = (made_on(&attributes), attributes.robot.as_deref().unwrap_or("unknown robot"));
-    if made == options.backend.name() && robot == options.robot.name {
+    let same_robot = options.backend == Backend::Simulator || robot == options.robot.name;
+    if made == options.backend.name() && same_robot {
         return Ok(());
     }
     Err(EngineError::OtherBackend {

@@ -91,8 +91,12 @@ pub fn run_watched<R: Robot>(
     let mut voids = 0;
     let mut same = SameLimit::default();
     let mut waited: Option<LongWait> = None;
-    // A person has left it without a verdict.
-    if let Some(suggested) = experiment.under_review().and_then(|row| row.suggested) {
+    // A session before this one has left it without a verdict.
+    if let Some(trial) = experiment.under_review().map(|row| row.trial) {
+        let Some(suggested) = experiment.verdict_without_person() else {
+            let reason = format!("trial {trial} waits for the verdict of a person: continue its study in the console");
+            return Err(RequestRefusal::NotNow(reason));
+        };
         experiment.judge(suggested, false)?;
     }
     loop {

@@ -52,7 +52,7 @@ pub struct ExperimentView {
     pub stage: ExperimentStage,
     /// Trial and revision of the proposal.
     pub proposal: Option<(u32, u32)>,
-    /// Suggested verdict of the trial under review.
+    /// Verdict of the trial under review that holds without a person.
     pub suggested: Option<Verdict>,
 }
 
@@ -61,7 +61,7 @@ impl ExperimentView {
         ExperimentView {
             stage: experiment.stage(),
             proposal: experiment.proposal().map(|proposal| (proposal.trial, proposal.revision)),
-            suggested: experiment.under_review().and_then(|row| row.suggested),
+            suggested: experiment.verdict_without_person(),
         }
     }
 }

@@ -27,6 +27,7 @@ pub use self::proposal_start::next_seed;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use self::attributes::TrialAttributes;
 use self::between_repeats::BetweenRepeats;
 use self::confirmation::{BestConfirmation, NextRepeat};
 use self::open_proposal::OpenProposal;
@@ -42,7 +43,9 @@ use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
-use crate::trial::{ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict};
+use crate::trial::{
+    Backend, ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict,
+};
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
@@ -164,6 +167,15 @@ impl Experiment {
             ExperimentState::Review(trial) => self.row(trial),
             _ => None,
         }
+    }
+
+    /// Returns the suggested verdict of the trial under review; none where a person has to judge: over a value by hand, and over a jump
+    /// of another backend.
+    pub fn verdict_without_person(&self) -> Option<Verdict> {
+        let row = self.under_review().filter(|row| row.hand_value.is_none())?;
+        let attributes = TrialAttributes::of(self.study.trials().get(row.trial as usize)?);
+        let measured_on = attributes.backend.as_deref().unwrap_or(Backend::Simulator.name());
+        row.suggested.filter(|_| measured_on == self.plan.backend.name())
     }
 
     /// Returns the best trial by the sampler's model and what that says of it; none for a sampler without a model.

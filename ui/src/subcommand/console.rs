@@ -12,7 +12,7 @@ use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::robot::hardware::Network;
+use quadfrog::robot::hardware::{HardwareError, Network};
 use quadfrog::trial::{Approval, Backend, Task};
 use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
 use quadfrog_console::connection::TerminalLocation;
@@ -129,7 +129,7 @@ pub struct ConsoleArguments {
     /// Continue the study in this folder
     #[arg(long, value_name = "DIR", add = ArgValueCandidates::new(completion::studies))]
     resume: Option<PathBuf>,
-    /// Continue on the robot a study that was made on the simulator or on another robot
+    /// Continue a study that was made on another robot, or between simulator and robot
     #[arg(long, requires = "resume")]
     accept_backend_change: bool,
     /// Observe only
@@ -248,6 +248,9 @@ fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Res
         (None, _) => {}
     }
     arguments.dds.apply(&mut network)?;
+    if !cfg!(feature = "go2") && matches!(network, Network::Go2(_)) {
+        return Err(Failure::input(HardwareError::WithoutGo2));
+    }
     Ok(Some(network))
 }
 

@@ -59,6 +59,9 @@ pub struct OptimizeArguments {
     /// workers together
     #[arg(long, value_name = "JOURNAL", conflicts_with = "resume")]
     join: Option<String>,
+    /// Continue on the simulator a study that was made on a robot
+    #[arg(long)]
+    accept_backend_change: bool,
     /// Print one JSON object per finished trial on standard output; table and messages go to standard error
     #[arg(long)]
     json: bool,
@@ -211,6 +214,7 @@ fn run_one(
         folder: Some(study.folder.clone()),
         approve: Approval::Auto,
         join: join.cloned(),
+        accept_backend_change: arguments.accept_backend_change,
         prior: prior.map(|prior| Arc::clone(&prior.model)),
         provenance: arguments.study.provenance(),
         ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
