@@ -36,6 +36,19 @@ fn error(served: &mut AskTell, line: &str) -> String {
     answer["error"].as_str().unwrap_or_else(|| panic!("{line}: {answer}")).to_owned()
 }
 
+/// Regression: predictions that were not finite made the worst trial the best.
+#[test]
+fn values_of_any_size_do_not_make_the_worst_trial_the_best() {
+    let mut served = AskTell::new(study(SamplerKind::Gp));
+    for number in 0..10 {
+        answer(&mut served, r#"{"ask":{}}"#);
+        let value = if number % 2 == 0 { -1e200 } else { -0.5 };
+        answer(&mut served, &json!({"tell": {"number": number, "value": value, "verdict": "accept"}}).to_string());
+    }
+    let best = answer(&mut served, r#"{"best":{}}"#);
+    assert_eq!(best["value"], json!(-0.5), "{best}");
+}
+
 /// The points are those of a study that runs the same trials, two of them open at the same time.
 #[test]
 fn the_points_are_those_of_a_study_with_the_same_results() {

@@ -254,6 +254,9 @@ impl ReadyPrior {
 }
 
 fn read(path: &Path) -> std::io::Result<String> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
     let mut text = String::new();
     let read = File::open(path)?.take(LARGEST_PRIOR + 1).read_to_string(&mut text)?;
     if read as u64 > LARGEST_PRIOR {

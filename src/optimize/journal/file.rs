@@ -87,7 +87,9 @@ impl JournalFile {
             return Err(JournalError::Shortened { path: self.path.clone(), had: self.offset, has: length });
         }
         file.seek(SeekFrom::Start(self.offset)).map_err(io)?;
-        let mut bytes = Vec::with_capacity((length - self.offset) as usize);
+        let mut bytes = Vec::new();
+        // A journal of a length beyond the memory is refused, not the end of the program.
+        bytes.try_reserve_exact((length - self.offset) as usize).map_err(|_| io(ErrorKind::OutOfMemory.into()))?;
         file.take(length - self.offset).read_to_end(&mut bytes).map_err(io)?;
         if self.offset == 0 && bytes.starts_with(SQLITE_MAGIC) {
             return Err(JournalError::Sqlite { path: self.path.clone() });

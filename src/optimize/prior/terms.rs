@@ -133,10 +133,13 @@ impl Ensemble {
 }
 
 /// The left singular vectors of (value of world k - mean) / scale over the points, at most [`COMPONENTS`], one fewer than worlds.
-/// The entry of largest magnitude of each is positive. `None` if the iteration does not converge.
+/// The entry of largest magnitude of each is positive. `None` if a difference is not finite or the iteration does not converge.
 fn components(at: &[Vec<f64>], scale: f64) -> Option<DMatrix<f64>> {
     let worlds = at.first().map_or(0, Vec::len);
     let differences = DMatrix::from_fn(worlds, at.len(), |k, i| (at[i][k] - mean(&at[i])) / scale);
+    if !differences.iter().all(|difference| difference.is_finite()) {
+        return None;
+    }
     let svd = differences.try_svd(true, false, f64::EPSILON, 10_000)?;
     let (u, singular) = (svd.u?, svd.singular_values);
     let largest = singular.iter().copied().fold(0.0, f64::max);

@@ -48,7 +48,8 @@ impl Study {
     pub fn predict(&self) -> ModelPredictions {
         let trials = sampler::predict(&self.ask(&[]));
         let best_first = |a: &&Prediction, b: &&Prediction| self.options.direction.best_first(a.value, b.value);
-        let best = trials.iter().filter(|prediction| prediction.stood).min_by(best_first);
+        let best =
+            trials.iter().filter(|prediction| prediction.stood && prediction.value.is_finite()).min_by(best_first);
         let best = best.map(|best| ModelBest {
             trial: best.trial,
             predicted: best.value,

@@ -269,6 +269,9 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     if format == TableFormat::Parquet {
         return Err(refuse(&"a Parquet table is not imported; convert it: pandas.read_parquet(...).to_csv(...)"));
     }
+    if table.metadata().is_ok_and(|about| !about.is_file()) {
+        return Err(refuse(&"it is not a regular file; give a table, *.csv or *.json"));
+    }
     let text = std::fs::read_to_string(table).map_err(|error| refuse(&error))?;
     let trials = match format {
         TableFormat::Json => exchange::from_json(&text),

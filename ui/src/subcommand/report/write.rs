@@ -51,6 +51,9 @@ fn check(file: &Path, option: &str, is_ours: fn(&str) -> bool) -> Result<(), Fai
     if file.is_dir() || file.file_name().is_none() {
         return refuse("it is a folder; give the name of a file in it");
     }
+    if file.metadata().is_ok_and(|about| !about.is_file()) {
+        return refuse("it is not a regular file; give another name");
+    }
     match std::fs::read(file) {
         Ok(bytes) if is_ours(&String::from_utf8_lossy(&bytes)) => Ok(()),
         Ok(_) => refuse("the file exists and is not part of a report; give another name or remove it"),
