@@ -109,18 +109,19 @@ impl Supervisor {
             Lowering::SitDown => (Trigger::SitDown, Command::SitDown, Mode::SitDown, "the robot sits down"),
             Lowering::Cancel => (Trigger::Cancel, Command::Cancel, Mode::Ready, "the countdown is cancelled"),
         };
-        let between_jumps = lowering == Lowering::SitDown && self.mode == Mode::Jump && self.in_a_row;
-        let text = if between_jumps { "no further jump; the robot lands, then sits down" } else { text };
+        // As in `Cycle::handle_command`.
+        let in_a_row = lowering == Lowering::SitDown && self.in_a_row && matches!(self.mode, Mode::Jump | Mode::Settle);
+        let text = if in_a_row { "no further jump; the robot lands, then sits down" } else { text };
         let answered = &mut self.lowerings_answered[lowering as usize];
         if self.control.lowering.count(lowering) == *answered {
-            return if between_jumps {
+            return if in_a_row {
                 self.command(command).map(|()| text.to_owned())
             } else {
                 self.ask(trigger, command, text)
             };
         }
         *answered += 1;
-        if self.mode != reached && !between_jumps {
+        if self.mode != reached && !in_a_row {
             self.require_allowed(trigger)?;
         }
         Ok(text.to_owned())
