@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::attributes::Origin;
+use super::plan::{RequestRefusal, must_be};
 use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
 use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
@@ -78,8 +79,9 @@ impl OpenProposal {
         self.draft.number
     }
 
-    pub fn is(&self, trial: u32, revision: u32) -> bool {
-        self.number() == trial && self.revision == revision
+    /// Refuses a request that was made for another proposal.
+    pub fn must_be(&self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
+        must_be((self.number(), self.revision), (trial, revision))
     }
 
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.

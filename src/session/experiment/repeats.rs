@@ -2,11 +2,11 @@
 //! the rollouts that count, with 0 for a fall; a void rollout is done again. A judged rollout is on disk when it is shown: after a
 //! crash the trial is queued again with it.
 
-use super::attributes::{self, RepeatsAttribute};
+use super::attributes::{self, JudgedAttributes, RepeatsAttribute};
 use super::between_repeats::BetweenRepeats;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};
-use crate::optimize::study::{Outcome, StudyError};
+use crate::optimize::study::{Outcome, StudyError, TellOutcome};
 use crate::telemetry::TrialSpec;
 use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
 
@@ -37,12 +37,7 @@ impl Experiment {
         let ExperimentState::BetweenRepeats(between) = &self.state else {
             return not_now("there is no repeat to approve");
         };
-        if (between.trial(), between.revision) != (trial, revision) {
-            return not_now(format!(
-                "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
-                between.trial()
-            ));
-        }
+        between.must_be(trial, revision)?;
         self.enter(ExperimentState::Running(trial), trial);
         Ok(self.spec(trial))
     }
@@ -114,12 +109,18 @@ impl Experiment {
 
     /// Gives the trial up between its rollouts: it is void, its rollouts stay on record.
     pub(super) fn give_up(&mut self, trial: u32) -> Result<(), RequestRefusal> {
-        if let Some(row) = self.rows.get_mut(&trial) {
-            row.verdict = Some(Verdict::Void);
-            row.cause = "given up between its repeats".to_owned();
+        let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
+        let cause = "given up between its repeats".to_owned();
+        let void = TrialRecord { verdict: Some(Verdict::Void), cause, ..row.clone() };
+        let judged = attributes::write(&JudgedAttributes::of(&void, false));
+        let told = self.study.tell_if(trial, Outcome::Fail, &judged, |_| true)?;
+        self.state = ExperimentState::Finished;
+        if told == TellOutcome::AlreadyFinished {
+            self.rows.remove(&trial);
+            self.propose()?;
+            return Err(RequestRefusal::EndedElsewhere(trial));
         }
-        self.write_judgement(trial, false)?;
-        self.study.tell(trial, Outcome::Fail)?;
+        self.rows.insert(trial, void);
         self.publish_row(trial);
         self.state = ExperimentState::Finished;
         Ok(self.propose()?)
