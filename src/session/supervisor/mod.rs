@@ -224,16 +224,6 @@ impl Supervisor {
         }
     }
 
-    /// Logs a warning of the engine.
-    pub fn report_warning(&mut self, message: String, time_ns: u64) {
-        self.log(LogLevel::Warning, message, time_ns);
-    }
-
-    /// Writes a message to the log.
-    pub fn report(&mut self, level: LogLevel, message: String, time_ns: u64) {
-        self.log(level, message, time_ns);
-    }
-
     /// Returns the mode that was reported to the session last.
     pub fn mode(&self) -> Mode {
         self.mode
@@ -444,7 +434,8 @@ impl Supervisor {
         self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
     }
 
-    fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
+    /// Writes a message to the log.
+    pub fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
         self.publish(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
     }
 }
