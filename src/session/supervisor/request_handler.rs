@@ -1,7 +1,7 @@
 //! Execution of the operator's requests.
 
 use super::unfinished::{ApprovalState, Asker, JobPurpose};
-use super::{Supervisor, study_requests};
+use super::{OTHER_FILE, Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::Lowering;
 use crate::session::arming_checklist::refusals;
@@ -88,6 +88,9 @@ impl Supervisor {
         }
         if let Some(error) = &self.recorder_error {
             return Err(format!("nothing is recorded ({error}); a jump without a recording is not measured"));
+        }
+        if let Some(warning) = &self.recorder_warning {
+            return Err(format!("{OTHER_FILE} ({warning}); end the session and continue the study in a new one"));
         }
         if let Some(inhibit) = self.inhibit() {
             return Err(inhibit);
