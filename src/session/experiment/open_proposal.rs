@@ -42,7 +42,7 @@ pub struct Changes {
     gains: BTreeMap<String, f64>,
 }
 
-/// The values of a open proposals at its approval.
+/// Values of an open proposal at its approval.
 pub struct ApprovedProposal {
     pub proposal: Proposal,
     pub origin: Origin,
@@ -175,6 +175,12 @@ impl OpenProposal {
             repeat: 0,
             repeats: 0,
         }
+    }
+
+    /// Whether the sampler `sim` has proposed without its model, as `gp`.
+    pub fn lacks_prior(&self) -> bool {
+        let about_worlds = self.draft.expected.is_some_and(|expected| expected.worlds.is_some());
+        self.study.options().sampler.kind == SamplerKind::Sim && !about_worlds
     }
 
     /// Returns the distance to earlier falls; none before the first trial that counts.

@@ -65,6 +65,10 @@ impl Experiment {
         let revision = self.next_revision();
         let open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
         let number = open.number();
+        if open.lacks_prior() {
+            let message = format!("trial {number} is proposed as by gp: the model of sim cannot be fitted");
+            self.outbox.push(Record::Log(LogRecord { level: LogLevel::Warning, source: "study".to_owned(), message }));
+        }
         self.outbox.push(Record::Insight(open.insight(&model)));
         self.outbox.push(Record::Proposal(open.proposal()));
         self.enter(ExperimentState::Proposed(Box::new(open)), number);
