@@ -231,11 +231,6 @@ impl ExperimentQueue {
         &self.view
     }
 
-    /// Whether a job is not finished.
-    pub fn is_busy(&self) -> bool {
-        !self.unfinished.is_empty()
-    }
-
     /// Whether the thread has ended by a panic: nothing is carried out any more.
     pub fn is_lost(&self) -> bool {
         matches!(self.place, JobPlace::Lost)
