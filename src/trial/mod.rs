@@ -165,8 +165,8 @@ impl JumpParameters {
 
 impl JumpParameters {
     /// Duration of one impulse and the pause after it, s; infinite without a pause.
-    fn period_s(&self) -> f64 {
-        0.5 / self.f0_hz + if self.f1_hz > 0.0 { 0.5 / self.f1_hz } else { f64::INFINITY }
+    pub fn period_s(&self) -> f64 {
+        self.impulse_s() + if self.f1_hz > 0.0 { 0.5 / self.f1_hz } else { f64::INFINITY }
     }
 
     /// Returns the number of impulses that begin within `duration_s`, at least one.

@@ -7,6 +7,7 @@ use super::between_repeats::BetweenRepeats;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};
 use crate::optimize::study::{Outcome, StudyError, TellOutcome};
+use crate::session::objective;
 use crate::telemetry::TrialSpec;
 use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
 
@@ -54,16 +55,12 @@ impl Experiment {
         let Some(row) = self.rows.get_mut(&trial) else { return not_now("no trial is under review") };
         let TrialRecord { verdict, value, cause, measured, .. } = row.clone();
         row.repeats.push(RepeatRecord { seed, verdict, value, cause, measured });
-        let counted = row.counted_repeats();
-        let done = counted >= wanted;
-        if done {
-            let values: Vec<f64> = row.repeats.iter().filter_map(|repeat| repeat.value).collect();
-            let falls = row.repeats.iter().filter(|repeat| repeat.verdict == Some(Verdict::Fall)).count() as u32;
-            let mean = values.iter().sum::<f64>() / f64::from(counted.max(1));
-            let verdict = if falls == counted { Verdict::Fall } else { Verdict::Accept };
-            (row.verdict, row.suggested, row.value) = (Some(verdict), Some(verdict), Some(mean));
-            row.cause = format!("mean of {counted} repeats, {falls} fell");
-            return Ok(Some(mean));
+        if row.counted_repeats() >= wanted {
+            let judged = row.repeats.iter().filter_map(|repeat| Some((repeat.verdict?, repeat.value)));
+            let counted: Vec<_> = judged.filter(|(verdict, _)| *verdict != Verdict::Void).collect();
+            let (verdict, mean, cause) = objective::judge_repeats(&counted);
+            (row.verdict, row.suggested, row.value, row.cause) = (Some(verdict), Some(verdict), mean, cause);
+            return Ok(mean);
         }
         let repeats = row.repeats.clone();
         (row.verdict, row.suggested, row.value, row.hand_value, row.measured) = (None, None, None, None, None);
@@ -122,7 +119,6 @@ impl Experiment {
         }
         self.rows.insert(trial, void);
         self.publish_row(trial);
-        self.state = ExperimentState::Finished;
         Ok(self.propose()?)
     }
 }
