@@ -1,4 +1,4 @@
-//! What the model has learned of the robot, for the operator; the sampler does not read it.
+//! Findings of the model about the robot, for the operator; the sampler does not read them.
 
 use super::history::History;
 use super::model::ValueModel;
@@ -23,7 +23,7 @@ pub struct MeanAndDeviation {
     pub deviation: f64,
 }
 
-/// How well one simulated robot explains the jumps.
+/// Weight of one simulated robot by its likelihood.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WorldWeight {
     /// Name of the world.

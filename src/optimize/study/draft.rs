@@ -48,7 +48,7 @@ pub struct TrialDraft {
     pub attributes: BTreeMap<String, Value>,
     /// The joint sample of TPE, by name; announced to other workers.
     pub joint: Vec<(String, f64)>,
-    /// What the sampler's model expects of the trial at the values above.
+    /// Expectation of the sampler's model of the trial at the values above.
     pub expected: Option<Expectation>,
     /// Seed of the random streams.
     pub seed: u32,
