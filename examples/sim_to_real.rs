@@ -40,7 +40,7 @@ const LONG: usize = 100;
 /// Share of the optimum that counts as reached.
 const REACHED: f64 = 0.95;
 
-/// What proposes the jumps of a study.
+/// Source of the jumps of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Proposer {
     /// The sampler about the ensemble.

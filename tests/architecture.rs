@@ -468,6 +468,28 @@ fn every_cited_path_exists() {
 }
 
 /// The engine has no terminal: its manifest has no such crate.
+/// `docs/style.md`, Sentences, rule 2.
+#[test]
+fn no_doc_comment_begins_with_a_question_word() {
+    let folders = ["src", "ui/src", "examples", "tests", "benches"];
+    let mut violations = Vec::new();
+    for file in folders.iter().flat_map(|folder| files(&root().join(folder), "rs")) {
+        let text = fs::read_to_string(&file).unwrap();
+        let mut inside = false;
+        for (at, line) in text.lines().enumerate() {
+            let line = line.trim_start();
+            let comment = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));
+            let asks =
+                |comment: &str| ["What ", "How ", "Who "].iter().any(|word| comment.trim_start().starts_with(word));
+            if !inside && comment.is_some_and(asks) {
+                violations.push(format!("{}:{}: {line}", short(&file), at + 1));
+            }
+            inside = comment.is_some();
+        }
+    }
+    assert_none(&violations, "A doc comment begins with a noun phrase or a third-person verb (docs/style.md).");
+}
+
 #[test]
 fn the_engine_depends_on_no_terminal() {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();

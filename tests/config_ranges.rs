@@ -15,7 +15,7 @@ use quadfrog::telemetry::{Tick, TrialEnd};
 use quadfrog::trial::{Backend, JumpParameters, Task, Verdict};
 use toml::{Table, Value};
 
-/// What a number is replaced by.
+/// Replacement of a number.
 fn mutations() -> [Value; 9] {
     [
         Value::Integer(0),

@@ -327,6 +327,26 @@ fn an_operator_lost_in_flight_is_landed_and_sat_down() {
     assert!(matches!(bench.ends()[..], [TrialEnd::Fault(Fault::OperatorLost { .. })]), "{:?}", bench.ends());
 }
 
+/// An operator who returns before REVIEW: the robot sits down all the same, from flight and from SETTLE.
+#[test]
+fn a_robot_that_was_landed_sits_down_though_the_operator_has_returned() {
+    for mode in [Mode::Jump, Mode::Settle] {
+        let mut bench = if mode == Mode::Jump { linked().airborne() } else { in_mode(mode) };
+        bench.inputs.operator_silent_ms = 1001;
+        bench.ticks(1);
+        bench.inputs.operator_silent_ms = 0;
+        bench.until(Mode::Review);
+        bench.ticks(1);
+        assert_eq!(bench.cycle.mode(), Mode::SitDown, "from {mode:?}");
+        let cause = bench.events.last();
+        assert!(
+            matches!(cause, Some(Event::Mode { cause: TransitionCause::Fault(Fault::OperatorLost { .. }), .. })),
+            "from {mode:?}: {cause:?}"
+        );
+        bench.until(Mode::Disarmed);
+    }
+}
+
 /// A trial that had landed already when the operator was lost is measured to its end and counts.
 #[test]
 fn a_trial_that_had_landed_counts_though_the_operator_is_lost() {

@@ -93,16 +93,52 @@ fn sitting_down_between_jumps_leaves_no_further_impulse() {
     assert_eq!(suggest(&TrialEnd::SatDown), (Verdict::Void, "no further jump: sat down by the operator".to_owned()));
 }
 
-/// In the last jump there is nothing to drop: a jump cannot be sat down.
+/// A second press, in the jump that the first one has made the last, and in SETTLE.
 #[test]
-fn sitting_down_in_the_last_jump_is_refused() {
+fn sitting_down_in_the_last_jump_sits_the_robot_down_after_it() {
     let mut bench = in_the_third_jump();
     bench.command(Command::SitDown);
     bench.command(Command::SitDown);
-    assert_eq!(bench.refusal(), Some(CommandRefusal::Mode));
+    assert_eq!(bench.refusal(), None);
+    bench.until(Mode::Settle);
+    bench.command(Command::SitDown);
+    assert_eq!(bench.refusal(), None);
+    assert_eq!(impulses_until_disarmed(&mut bench), 0);
+    assert_eq!(bench.ends(), [TrialEnd::SatDown]);
 }
 
-/// What inhibits the next trial (HOLD) also ends jumps in a row; the robot stays in REVIEW.
+/// The trial ends as without the request where no jump is left to drop.
+#[test]
+fn sitting_down_after_a_hold_or_in_settle_sits_the_robot_down_after_the_trial() {
+    let mut bench = in_the_third_jump();
+    bench.robot.tamper = |state| state.motor_temperature_c[6] = 72.0;
+    bench.tick(None);
+    bench.command(Command::SitDown);
+    assert_eq!(bench.refusal(), None);
+    assert_eq!(impulses_until_disarmed(&mut bench), 0);
+    let ends = bench.ends();
+    assert!(matches!(ends[..], [TrialEnd::Held(TrialInhibit::MotorWarm { .. })]), "{ends:?}");
+}
+
+/// A single jump has no pause: the request is refused, and the robot stands in REVIEW.
+#[test]
+fn sitting_down_in_a_single_jump_is_refused() {
+    let (config, description, settings) = shipped(Backend::Simulator);
+    let robot = LinkedRobot::lying(&description, &config.simulator);
+    let mut bench = Bench::new(config, settings, LinkedRobot { with_truth: true, ..robot }).reach(Mode::Ready);
+    bench.settle();
+    let spec = bench.config.task(Task::Forward).trial(Task::Forward, JUMP);
+    bench.command(Command::RunTrial(spec, bench.permit()));
+    bench.until(Mode::Jump);
+    bench.command(Command::SitDown);
+    assert_eq!(bench.refusal(), Some(CommandRefusal::Mode));
+    bench.until(Mode::Review);
+    for _ in 0..100 {
+        assert_eq!(bench.tick(None).mode, Mode::Review);
+    }
+}
+
+/// A cause that inhibits the next trial (HOLD) also ends jumps in a row; the robot stays in REVIEW.
 #[test]
 fn a_hold_between_jumps_leaves_no_further_impulse() {
     let mut bench = in_the_third_jump();

@@ -111,7 +111,7 @@ struct Sequence {
     silent: bool,
     /// The first permit of the run; stale after any change of mode.
     old_permit: Permit,
-    /// What happened, for the message of a failure.
+    /// Course of the sequence, for the message of a failure.
     log: Vec<String>,
 }
 

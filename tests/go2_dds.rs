@@ -62,7 +62,7 @@ impl Peer {
         Peer(python.spawn().unwrap())
     }
 
-    /// What it counted, at its end.
+    /// Counts of the peer at its end.
     fn counts(self) -> Value {
         let output = self.0.wait_with_output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();

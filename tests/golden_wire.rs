@@ -9,22 +9,11 @@ use quadfrog::robot::go1::packet::{
 };
 use serde::Deserialize;
 use serde_json::Value;
-
-#[derive(Deserialize)]
-struct File<T> {
-    cases: Vec<T>,
-}
+use support::bytes;
 
 /// Reads `wire/<name>` in the golden folder, or `<name>` if the folder itself holds the datagrams.
 fn cases<T: serde::de::DeserializeOwned>(name: &str) -> Vec<T> {
-    let nested = format!("wire/{name}");
-    let name = if support::golden_folder().join(&nested).exists() { &nested } else { name };
-    support::golden::<File<T>>(name).cases
-}
-
-fn bytes(hex: &str) -> Vec<u8> {
-    assert!(hex.len().is_multiple_of(2));
-    (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect()
+    support::golden_cases("wire", name)
 }
 
 #[derive(Deserialize)]

@@ -15,22 +15,11 @@ use quadfrog::robot::remote::RemoteButtons;
 use quadfrog::robot::{Battery, JointCommand, RobotState};
 use serde::Deserialize;
 use serde_json::Value;
-
-#[derive(Deserialize)]
-struct File<T> {
-    cases: Vec<T>,
-}
+use support::bytes;
 
 /// Reads `wire_go2/<name>` in the golden folder, or `<name>` if the folder itself holds the payloads.
 fn cases<T: serde::de::DeserializeOwned>(name: &str) -> Vec<T> {
-    let nested = format!("wire_go2/{name}");
-    let name = if support::golden_folder().join(&nested).exists() { &nested } else { name };
-    support::golden::<File<T>>(name).cases
-}
-
-fn bytes(hex: &str) -> Vec<u8> {
-    assert!(hex.len().is_multiple_of(2));
-    (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect()
+    support::golden_cases("wire_go2", name)
 }
 
 #[derive(Deserialize)]

@@ -1,4 +1,4 @@
-//! What Miri interprets (`docs/safety.md`): datagrams as memory layout, rings and buffers between threads, the journal's
+//! Tests that Miri interprets (`docs/safety.md`): datagrams as memory layout, rings and buffers between threads, the journal's
 //! codec. No file, no socket, no C library.
 
 use std::thread;

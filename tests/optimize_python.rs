@@ -3,6 +3,8 @@
 
 #[path = "support/redis.rs"]
 mod redis;
+#[path = "support/skip.rs"]
+mod skip;
 #[path = "support/optimize.rs"]
 mod support;
 
@@ -15,6 +17,7 @@ use quadfrog::optimize::study::{Outcome, Storage, Study};
 use quadfrog::optimize::trial::{Distribution, Trial, TrialState, value_of};
 use redis::Ended;
 use serde_json::{Value, json};
+use skip::skip;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -30,7 +33,7 @@ fn python_has(module: &str, version: &str) -> bool {
     let check = format!("import {module}; assert {module}.__version__.startswith('{version}')");
     let found = Command::new("python3").args(["-c", &check]).stderr(Stdio::null()).status().is_ok_and(|s| s.success());
     if !found {
-        println!("skipped: python3 has no {module} {version}");
+        skip(&format!("python3 has no {module} {version}"));
     }
     found
 }

@@ -3,6 +3,8 @@
 
 #[path = "support/redis.rs"]
 mod redis;
+#[path = "support/skip.rs"]
+mod skip;
 #[path = "support/optimize.rs"]
 mod support;
 
@@ -11,6 +13,7 @@ use quadfrog::optimize::study::{Storage, Study, StudyError};
 use quadfrog::optimize::trial::{Trial, TrialState};
 use redis::{Ended, address, free_port, server, start};
 use serde_json::{Value, json};
+use skip::skip;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::{Command, Stdio};
@@ -95,7 +98,7 @@ fn four_workers_one_of_them_killed_lose_nothing_and_double_nothing() {
 fn a_python_worker_joins_the_study() {
     let has = Command::new("python3").args(["-c", "import optuna, redis"]).stderr(Stdio::null()).status();
     if !has.is_ok_and(|s| s.success()) {
-        println!("skipped: python3 has no optuna with redis");
+        skip("python3 has no optuna with redis");
         return;
     }
     let Some((_server, url)) = server() else { return };

@@ -381,12 +381,6 @@ fn the_insight_finds_the_robot_among_the_worlds_and_its_share_of_them() {
     assert!((learned.worlds.iter().map(|w| w.weight).sum::<f64>() - 1.0).abs() < 1e-12);
     assert!(learned.trusted);
     assert!(learned.rho.deviation < 0.3, "six jumps say more than the prior's 0.3: {:?}", learned.rho);
-    assert_eq!(learned.observed.len(), 6);
-    for (seen, trial) in learned.observed.iter().zip(study.trials()) {
-        assert_eq!(seen.number, trial.number);
-        let error = seen.value.mean - robot.value(&unit(&study, trial.number));
-        assert!(error.abs() < 4.0 * seen.value.deviation + 0.02, "trial {}: {error} {:?}", seen.number, seen.value);
-    }
     // A robot that jumps 0.7 of the worlds' mean.
     let weak = Formula { gain: 0.7, best: 0.56, grip: 0.5 };
     let mut study = study_with(&model, 0);

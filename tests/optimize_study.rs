@@ -3,12 +3,19 @@
 #[path = "support/optimize.rs"]
 mod support;
 
+use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use quadfrog::optimize::ask::{Direction, SamplerConfig};
+use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, Operation};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, TellOutcome};
 use quadfrog::optimize::trial::{Trial, TrialState, value_of};
 use serde_json::{Value, json};
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
 use support::{begin, forward_log, in_memory};
 use tempfile::{TempDir, tempdir};
 
@@ -192,6 +199,69 @@ fn a_torn_last_line_is_cut_off_and_kept_aside() {
         assert_eq!(study.trials().len(), 2, "the other session continues reading");
         assert_eq!(table(&open(&path, 0, true)), table(&study));
     }
+}
+
+/// Set in the child process of the test below.
+const FULL_DISK: &str = "QUADFROG_TEST_FULL_DISK";
+
+/// A disk that is full after the first lines of a commit. In a child process, whose limit on the length of files cuts the write off;
+/// the signal of that limit is ignored.
+#[test]
+fn a_commit_that_a_full_disk_cuts_off_leaves_no_line() {
+    if std::env::var_os(FULL_DISK).is_none() {
+        let name = "a_commit_that_a_full_disk_cuts_off_leaves_no_line";
+        let mut child = Command::new("sh");
+        child.args(["-c", "trap '' XFSZ; exec \"$@\"", "sh"]).arg(std::env::current_exe().unwrap());
+        let ended = child.args(["--exact", name, "--nocapture"]).env(FULL_DISK, "1").status().unwrap();
+        assert!(ended.success());
+        return;
+    }
+    let (_folder, path, mut study) = with_a_trial();
+    let before = std::fs::read(&path).unwrap();
+    let draft = study.draft();
+    let (free, most) = getrlimit(Resource::RLIMIT_FSIZE).unwrap();
+    // Room for the first line, the creation of the trial.
+    setrlimit(Resource::RLIMIT_FSIZE, before.len() as u64 + 400, most).unwrap();
+    let error = study.begin(&draft, &[], &[]).unwrap_err();
+    setrlimit(Resource::RLIMIT_FSIZE, free, most).unwrap();
+    assert!(error.to_string().contains("append to"), "{error}");
+    assert!(std::fs::read(&path).unwrap() == before, "lines of the commit stay");
+    study.refresh().unwrap();
+    assert_eq!((study.trials().len(), study.running().count()), (1, 0));
+    assert_eq!(study.begin(&draft, &[], &[]).unwrap(), 1);
+}
+
+/// A writer that is stopped between its reading and its writing, while another one takes its lock to be stale.
+#[test]
+fn a_writer_that_was_stopped_for_longer_than_the_grace_deletes_no_line_of_another() {
+    type Failure = Box<dyn std::error::Error>;
+    let (_folder, path, study) = with_a_trial();
+    drop(study);
+    OpenOptions::new().append(true).open(&path).unwrap().write_all(b"{\"op_code\": 4").unwrap();
+    let journal = |grace| Journal::open(JournalFile::new(&path, Durability::Buffered, grace).unwrap()).unwrap();
+    let create = |name: &str| Operation::CreateStudy { name: name.to_owned(), directions: vec![2] };
+    let (mut stopped, mut other) = (journal(LOCK_GRACE), journal(Duration::from_millis(20)));
+    let mut decisions = 0;
+    let committed = stopped.commit(|_| {
+        decisions += 1;
+        if decisions == 1 {
+            other.commit(|_| Ok::<_, Failure>(vec![create("other")])).unwrap();
+        }
+        Ok::<_, Failure>(vec![create("stopped")])
+    });
+    assert!(committed.is_ok() && decisions == 2, "decided {decisions} times: {committed:?}");
+    let names: Vec<String> = journal(LOCK_GRACE).state().studies().iter().map(|study| study.name.clone()).collect();
+    assert!(names.ends_with(&["other".to_owned(), "stopped".to_owned()]), "{names:?}");
+
+    // The lock of a third writer is not released with one that was broken.
+    let lock = path.with_file_name("study.log.lock");
+    let refused = stopped.commit(|_| {
+        std::fs::remove_file(&lock).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+        symlink(&path, &lock).unwrap();
+        Err::<Vec<Operation>, Failure>("refused".into())
+    });
+    assert!(refused.is_err() && lock.is_symlink());
 }
 
 #[test]

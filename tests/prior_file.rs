@@ -76,7 +76,7 @@ fn a_prior_is_kept_and_reused_until_something_changes_that_it_depends_on() {
     assert_ne!(a1.key(), maker(&[]).key());
 }
 
-/// What is in the way is named and replaced: a prior can be made again at any time.
+/// A file in the way is named and replaced: a prior can be made again at any time.
 #[test]
 fn a_damaged_or_foreign_file_is_made_again_with_a_notice() {
     let folder = tempfile::tempdir().unwrap();

@@ -64,7 +64,7 @@ fn a_warm_up_precedes_its_tick_or_is_left_out() {
         next: u64,
         /// Ticks with a warm-up, and its time.
         warmed: Vec<(u64, u64)>,
-        /// How long before its tick was due each warm-up began, ns, or somewhat more: the clock is read late.
+        /// Time from the begin of each warm-up to the planned start of its tick, ns, or somewhat more: the clock is read late.
         leads: Vec<u64>,
     }
     impl thread::PeriodicTask for Course {

@@ -2,6 +2,8 @@
 
 #[path = "support/python_reader.rs"]
 mod python_reader;
+#[path = "support/skip.rs"]
+mod skip;
 #[path = "support/recording.rs"]
 mod support;
 

@@ -67,7 +67,16 @@ impl Session {
     }
 
     fn start(backend: Backend, folder: Option<std::path::PathBuf>, observe: bool, unseen: Option<String>) -> Session {
-        let config = Config::load(None).unwrap();
+        Session::of(Config::load(None).unwrap(), backend, folder, observe, unseen)
+    }
+
+    fn of(
+        config: Config,
+        backend: Backend,
+        folder: Option<std::path::PathBuf>,
+        observe: bool,
+        unseen: Option<String>,
+    ) -> Session {
         let robot = RobotDescription::embedded("go1").unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: ControlSettings = options.config.settings(&options.robot, options.task, backend).unwrap();
@@ -119,11 +128,12 @@ impl Session {
         let time_ns = self.time_ms * 1_000_000;
         self.supervisor
             .handle_request(&StampedRequest { request, stops: self.operator.stop.count(), time_ns }, time_ns);
-        let mut records = self.screen.try_iter().map(|stamped| stamped.record);
-        let answer = records.find_map(|record| match record {
-            Record::Request(command) => Some(command),
+        let records: Vec<Record> = self.screen.try_iter().map(|stamped| stamped.record).collect();
+        let answer = records.iter().find_map(|record| match record {
+            Record::Request(command) => Some(command.clone()),
             _ => None,
         });
+        self.records.extend(records);
         self.ticks(5);
         answer.expect("every request is answered")
     }
@@ -624,6 +634,49 @@ fn a_robot_sits_down_at_the_end_of_a_trial_if_so_configured() {
             assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting, "a person may go to it now");
         }
     }
+}
+
+/// Regression: in the last of several jumps the request was answered as accepted, the control thread refused it, and the robot
+/// stayed standing in REVIEW.
+#[test]
+fn an_accepted_request_to_sit_down_in_the_last_jump_sits_the_robot_down() {
+    let mut config = Config::load(None).unwrap();
+    let forward = config.control.tasks.get_mut("forward").unwrap();
+    (forward.jumps, forward.f1_hz) = (2, 0.8);
+    let mut session = Session::of(config, Backend::Simulator, None, false, None);
+    session.ticks(10);
+    session.supervisor.take_control();
+    session.ticks(1500);
+    assert!(session.request(OperatorRequest::Arm).accepted);
+    session.ticks(4000);
+    for (parameter, value) in [("f0", 1.4), ("Fx", 30.0), ("Fz", 220.0)] {
+        let answer = session.request(OperatorRequest::Override { parameter: parameter.to_owned(), value });
+        assert!(answer.accepted, "{answer:?}");
+    }
+    let proposal = session.records.iter().rev().find_map(|record| match record {
+        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+        _ => None,
+    });
+    let (trial, revision) = proposal.expect("a proposal");
+    let answer = session.request(OperatorRequest::Approve { trial, revision });
+    assert!(answer.accepted, "{answer:?}");
+    while session.body.mode() != Mode::Jump {
+        session.ticks(1);
+    }
+    // The first press makes the present jump the last one.
+    for _ in 0..2 {
+        let answer = session.request(OperatorRequest::SitDown);
+        assert!(answer.accepted, "{answer:?}");
+    }
+    session.records.clear();
+    session.ticks(15_000);
+    let entered = session.records.iter().filter_map(|record| match record {
+        Record::Transition(change) => Some(change.to),
+        _ => None,
+    });
+    assert_eq!(entered.collect::<Vec<_>>(), [Mode::Settle, Mode::Review, Mode::SitDown, Mode::Disarmed]);
+    let refused = |record: &&Record| matches!(record, Record::Log(log) if log.message.contains("refused"));
+    assert_eq!(session.records.iter().find(refused), None);
 }
 
 /// With mosh or in tmux the loss of the operator is not detected, so the robot would go on.

@@ -1,4 +1,4 @@
-//! What the sampler's model expects of a trial, before it runs and afterwards: in the proposal, the row, the journal, and the
+//! Expectation of the sampler's model of a trial, before it runs and afterwards: in the proposal, the row, the journal, and the
 //! best trial that follows from it.
 
 #[path = "support/experiment.rs"]
@@ -147,6 +147,20 @@ fn the_sampler_sim_expects_from_the_first_jump_on_and_compares_robot_and_simulat
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
     let best = experiment.best().unwrap();
     assert!(best.value.unwrap() > 0.66, "six jumps reach {best:?} of 0.7 m");
+}
+
+/// `sim` proposes as `gp` where it has no model, and not silently.
+#[test]
+fn a_proposal_of_sim_without_its_model_is_in_the_log() {
+    for (known, lines) in [(false, 1), (true, 0)] {
+        let mut study = study(SamplerKind::Sim, Storage::Memory);
+        if known {
+            study.use_prior(prior([0.8, 1.0, 1.6]));
+        }
+        let mut experiment = Experiment::open(plan(12), study).unwrap();
+        let says = |record: &Record| matches!(record, Record::Log(log) if log.message.contains("proposed as by gp"));
+        assert_eq!(experiment.take_records().iter().filter(|record| says(record)).count(), lines);
+    }
 }
 
 #[test]

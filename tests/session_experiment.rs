@@ -13,7 +13,10 @@ use quadfrog::session::experiment::{Experiment, import};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{FallCause, TrialEnd};
 use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
-use support::{accept, approve, experiment, far, joined, open, parameters, plan, run, study, study_in, ticks};
+use support::{
+    accept, approve, experiment, far, joined, open, parameters, plan, run, skip, study, study_in, ticks,
+    without_journal,
+};
 
 const PATIENT: Duration = Duration::from_secs(3600);
 
@@ -89,6 +92,53 @@ fn an_approval_of_an_earlier_card_is_refused() {
     let error = experiment.approve(seen.trial, seen.revision).unwrap_err().to_string();
     assert!(error.contains("has changed since it was shown"), "{error}");
     assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+}
+
+/// Another program's point, proposed after the operator's question was shown, is not void by its answer.
+#[test]
+fn a_proposal_that_was_not_seen_is_not_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let seen = experiment.proposal().unwrap();
+    study_in(folder.path()).enqueue(&[("Fx".to_owned(), 77.0)], &[]).unwrap();
+    experiment.refresh().unwrap();
+    let error = experiment.skip(seen.trial, seen.revision).unwrap_err().to_string();
+    assert!(error.contains("has changed since it was shown"), "{error}");
+    assert_eq!((experiment.stage(), experiment.rows().count()), (ExperimentStage::Proposed, 0));
+    assert_eq!(parameters(&experiment)[1], 77.0);
+    skip(&mut experiment);
+    assert_eq!(experiment.row(0).unwrap().verdict, Some(Verdict::Void));
+}
+
+/// A skipped proposal is stored in one commit: at no time does it run.
+#[test]
+fn a_skipped_proposal_has_ended_when_it_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    skip(&mut experiment);
+    let text = std::fs::read_to_string(folder.path().join("study.log")).unwrap();
+    let at = |part: &str| text.lines().position(|line| line.contains(part)).unwrap();
+    let (verdict, end) = (at("\"verdict\""), at("\"op_code\":6,"));
+    assert!(verdict < end, "the verdict stands before the end of the trial, which is final");
+    let study = study_in(folder.path());
+    assert_eq!(study.trial(0).unwrap().state, TrialState::Fail);
+    let ended = |experiment: &Experiment| {
+        let row = experiment.row(0).unwrap();
+        (row.verdict, row.cause.clone())
+    };
+    assert_eq!(ended(&experiment), (Some(Verdict::Void), "skipped before the jump".to_owned()));
+    assert_eq!(ended(&open(folder.path())), ended(&experiment));
+}
+
+#[test]
+fn a_note_that_cannot_be_stored_is_not_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    without_journal(folder.path(), || experiment.note(0, "left paw slipped")).unwrap_err();
+    assert_eq!(experiment.row(0).unwrap().note, "");
+    experiment.note(0, "left paw slipped").unwrap();
+    assert_eq!(experiment.row(0).unwrap().note, "left paw slipped");
 }
 
 #[test]
@@ -284,7 +334,7 @@ fn requests_name_numbers_with_six_digits() {
 fn a_skipped_proposal_is_not_told_and_another_follows() {
     let mut experiment = experiment(5);
     let before = parameters(&experiment);
-    experiment.skip().unwrap();
+    skip(&mut experiment);
     assert_ne!(parameters(&experiment), before);
     assert_eq!(experiment.counted(), 0);
     assert_eq!(experiment.row(0).unwrap().verdict, Some(Verdict::Void));
@@ -329,7 +379,7 @@ fn eventful(experiment: &mut Experiment, step: u32) {
             run(experiment, TrialEnd::Settled);
             experiment.judge(Verdict::Void, true).unwrap();
         }
-        5 => experiment.skip().unwrap(),
+        5 => skip(experiment),
         _ => {
             accept(experiment);
         }

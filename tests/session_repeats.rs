@@ -6,7 +6,7 @@ mod experiment;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use experiment::{plan, study, study_in, ticks};
+use experiment::{plan, skip, study, study_in, ticks, without_journal};
 use quadfrog::optimize::study::Storage;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
@@ -150,9 +150,21 @@ fn an_interrupted_trial_goes_on_with_its_judged_rollouts() {
 fn a_trial_can_be_given_up_between_its_rollouts() {
     let mut experiment = three();
     judged(&mut experiment, TrialEnd::Settled, 0.6, Verdict::Accept);
-    experiment.skip().unwrap();
+    skip(&mut experiment);
     assert_eq!((row(&experiment, 0).verdict, experiment.counted()), (Some(Verdict::Void), 0));
     assert_eq!(repeat(&experiment), (1, 1, 3));
+}
+
+#[test]
+fn a_trial_whose_end_cannot_be_stored_is_not_shown_as_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = three_in(folder.path());
+    judged(&mut experiment, TrialEnd::Settled, 0.6, Verdict::Accept);
+    let seen = experiment.proposal().unwrap();
+    without_journal(folder.path(), || experiment.skip(seen.trial, seen.revision)).unwrap_err();
+    assert_eq!((row(&experiment, 0).verdict, repeat(&experiment)), (None, (0, 2, 3)));
+    skip(&mut experiment);
+    assert_eq!(row(&experiment, 0).verdict, Some(Verdict::Void));
 }
 
 /// A trial that is one rollout has no repeats on record, and the seed that it always had.

@@ -195,7 +195,7 @@ fn a_wait_changes_no_proposal() {
             let shown = screen.proposal();
             points.push(shown.parameters.iter().map(|p| p.value).collect::<Vec<_>>());
             let lock = waits.then(|| HeldLock::hold(folder.path()));
-            screen.handle.request(OperatorRequest::Skip);
+            screen.handle.request(OperatorRequest::Skip { trial: shown.trial, revision: shown.revision });
             if waits {
                 screen.until("the wait", |s| s.handle.storage_wait().is_some());
             }

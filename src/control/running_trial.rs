@@ -33,6 +33,8 @@ pub struct RunningTrial {
     /// Ticks since the trial began; the oscillator enters pi at `countdown`.
     elapsed: u32,
     countdown: u32,
+    /// Whether the trial began with several jumps; the further ones may have been dropped.
+    in_a_row: bool,
     /// Impulses that have begun.
     begun: u32,
     /// Ticks for which the oscillator has waited at the end of the present pause, and of all pauses.
@@ -66,6 +68,7 @@ impl RunningTrial {
             amplitudes_leg: amplitudes_leg(&spec.jump, spec.task),
             elapsed: 0,
             countdown: ticks_in(settings.countdown_s),
+            in_a_row: spec.jumps > 1,
             begun: 0,
             waiting: 0,
             waited: 0,
@@ -128,6 +131,11 @@ impl RunningTrial {
         let dropped = self.has_further_impulses();
         self.spec.jumps = self.spec.jumps.min(self.begun.max(1));
         dropped
+    }
+
+    /// Whether the trial began with several jumps.
+    pub fn is_in_a_row(&self) -> bool {
+        self.in_a_row
     }
 
     /// Whether an impulse is to begin after the present one.

@@ -28,7 +28,7 @@ pub struct ControlThreadParts<'a, C> {
     pub closing: &'a AtomicBool,
     /// Whether the robot is real. A real robot keeps the last command when nothing more is sent, a simulated one stands still;
     /// and the caches are warmed before each tick of a real one.
-    pub real: bool,
+    pub hardware: bool,
     /// Heartbeat to the guard; none without a guard.
     pub guard_heartbeat: Option<GuardHeartbeat>,
 }
@@ -44,7 +44,7 @@ pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlPorts, robot:
     let granted = start.scheduling.apply();
     let _ = start.report.send((granted.granted.clone(), granted.denied.clone()));
     let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
-    let lead = lead(start.real);
+    let lead = lead(start.hardware);
     let paced = |ticking: &mut dyn PeriodicTask| pace_with_warm_up(period, CONTROL_TICK_OFFSET, lead, ticking);
     // Damping at the end is timed with sleep: the monotonic clock may have failed.
     if let Err(panic) = drive(&mut start, end, robot, paced, || std::thread::sleep(period)) {
@@ -53,8 +53,8 @@ pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlPorts, robot:
 }
 
 /// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, whose tick has no deadline.
-const fn lead(real: bool) -> Duration {
-    if real { WARM_UP_LEAD } else { Duration::ZERO }
+const fn lead(hardware: bool) -> Duration {
+    if hardware { WARM_UP_LEAD } else { Duration::ZERO }
 }
 
 /// The control loop and its robot, until the engine closes.
@@ -105,7 +105,7 @@ fn drive<C: Clock>(
             panic!("the control thread cannot read the monotonic clock: {error}");
         }
     }));
-    if start.real && ticking.control_loop.mode().commanded() {
+    if start.hardware && ticking.control_loop.mode().commanded() {
         let damping = JointCommand::damping(start.settings.gate.damping_kd);
         let mut sent = 0;
         while sent < LAST_DAMPINGS || !start.closing.load(Ordering::Acquire) {
@@ -176,7 +176,7 @@ mod tests {
             report: std::sync::mpsc::channel().0,
             clock: &SimulatedClock,
             closing: &closing,
-            real: true,
+            hardware: true,
             guard_heartbeat: None,
         };
         let mut ms = 0;

@@ -92,7 +92,7 @@ pub struct GuardHeartbeat {
     answered: bool,
 }
 
-/// What the guard is to do.
+/// Orders to the guard.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct GuardOrders {
     /// Longest silence of the control thread, ms.
@@ -173,7 +173,7 @@ impl GuardHeartbeat {
         if self.findings.broken.load(Ordering::Relaxed) { u32::MAX } else { self.reported_ms() }
     }
 
-    /// Tells the guard that the robot is not commanded any more.
+    /// Reports to the guard that the robot is not commanded any more.
     pub fn release(mut self) {
         self.send(false);
     }
@@ -259,7 +259,7 @@ fn guard_with(
                 let _ = send();
                 timeout = PollTimeout::from(1_u16);
             }
-            // After an error of poll, the read tells the state of the connection.
+            // After an error of poll, the read returns the state of the connection.
             Ok(_) | Err(_) => match connection.read(&mut signs) {
                 Err(error) if matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
                 // A connection that cannot be read has ended.

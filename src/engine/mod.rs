@@ -12,6 +12,7 @@ mod rejudging;
 mod session_thread;
 mod stored;
 mod study;
+mod threads;
 mod verify;
 
 pub use folder::{
@@ -32,15 +33,15 @@ pub use verify::{TickDifference, Verification, VerifyError, attached_configurati
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use self::folder::LockedFolder;
-use self::guard::Guard;
+use self::guard::{Guard, GuardHeartbeat};
 use self::recording::show_unrecorded;
 use self::study::open_without_prior;
+use self::threads::EngineThreads;
+use crate::control::settings::ControlSettings;
 use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;
 use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, channels};
@@ -49,7 +50,7 @@ use crate::realtime::scheduling::set_priority;
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
 use crate::recording::live::{LiveServer, LiveStatus};
-use crate::recording::record::{Record, Stamped};
+use crate::recording::record::{LogLevel, Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
 use crate::robot::hardware::{HardwareError, Network, OpenedRobot};
 use crate::robot::{Placement, Robot};
@@ -73,28 +74,21 @@ const BELOW_CONTROL: u8 = 10;
 /// # Errors
 /// When the configuration, the study, the recording or the system does not allow it; no thread runs then.
 pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
-    if options.approve == Approval::Auto && options.backend == Backend::Hardware {
+    let hardware = options.backend == Backend::Hardware;
+    if options.approve == Approval::Auto && hardware {
         return Err(EngineError::Unattended);
     }
     // Before a word goes to the robot.
     check_backend(&options)?;
     let settings = options.config.settings(&options.robot, options.task, options.backend)?;
     require_descriptors()?;
-    let system = |what: &'static str| {
-        move |source| EngineError::System { what: format!("the {what} could not be started"), source }
-    };
-    let (mut robot, guard): (Box<dyn Robot>, _) = match options.backend {
-        Backend::Simulator => (Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None),
-        Backend::Hardware => {
-            let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
-            let network = options.network.as_ref().ok_or_else(no_network)?;
-            let priority = options.config.scheduling(options.backend).priority;
-            let (robot, route) = open_robot(network, settings.gate.damping_kd, priority)?;
-            let post = |program: &PathBuf| Guard::start(program, route, &settings);
-            let guard = options.guard.as_ref().map(post).transpose().map_err(system("guard"))?;
-            (robot, guard)
+    let maker = match options.config.optimize.sampler.kind {
+        SamplerKind::Sim if options.prior.is_none() => {
+            Some(PriorMaker::new(&options.config, &options.robot, options.task)?)
         }
+        _ => None,
     };
+    let (mut robot, guard) = open_robot_and_guard(&options, &settings)?;
     // A simulated robot begins like a real one: lying folded on its belly.
     robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
     let folder = prepare_folder(&options)?;
@@ -115,86 +109,49 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let (to_recorder, recorder_records) = channel();
     let (to_console, console_records) = channel();
     let (to_session, ticks) = channel();
-    let recorder =
-        Recorder::spawn(tick_end, recorder_records, writer, to_session).map_err(system("recorder's thread"))?;
-    let sinks = RecordSinks { recorder: to_recorder, console: to_console };
+    let recorder = Recorder::spawn(tick_end, recorder_records, writer, to_session)
+        .map_err(EngineError::not_started("recorder's thread"))?;
     let status = recorder.watch();
-    let closing = Arc::new(AtomicBool::new(false));
+    // After an error below the threads end: what they wait for is declared after them, and dropped before.
+    let mut threads = EngineThreads::of(recorder);
+    let sinks = RecordSinks { recorder: to_recorder, console: to_console };
+    let scheduled = threads.spawn_control((robot, guard_heartbeat), control_end, &options, &settings, clock)?;
 
-    let thread = std::thread::Builder::new().name("control".into());
-    let flag = closing.clone();
-    let scheduling = options.config.scheduling(options.backend);
-    let (report_scheduling, scheduled) = channel();
-    let real = options.backend == Backend::Hardware;
-    let control = thread
-        .spawn(move || {
-            let start = control_thread::ControlThreadParts {
-                settings: &settings,
-                scheduling,
-                report: report_scheduling,
-                clock: &clock,
-                closing: &flag,
-                real,
-                guard_heartbeat,
-            };
-            control_thread::run(start, control_end, &mut *robot);
-        })
-        .map_err(system("control thread"))?;
-
-    let (to_supervisor, requests) = channel();
     let recorded_in = recording.as_ref().and(options.folder.clone());
     let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in)
         .with_unseen_connection(options.unseen_connection.clone())
         .with_low_level(options.network.as_ref().map_or("none in the simulator", Network::low_level));
-    let parts = SupervisorParts {
-        experiment,
-        control: session_end,
-        ticks,
-        sinks,
-        recorder: status,
-        checklist,
-        approval: settings.approval,
-        info,
-    };
-    let simulated = options.backend == Backend::Simulator;
-    let review_sits_down = !simulated && options.config.safety.failsafe.hardware_review_sits_down;
-    let mut supervisor = Supervisor::new(parts, clock.now_ns())
-        .approving(options.approve, simulated)
-        .naming_limits(settings)
-        .sitting_down_for_review(review_sits_down && !options.observe)
-        .with_storage_thread()
-        .map_err(system("storage thread"))?;
-    if options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none() {
-        let maker = PriorMaker::new(&options.config, &options.robot, options.task)?;
-        make_prior(&mut supervisor, maker, &options, clock.now_ns());
-    }
+    let approval = settings.approval;
+    let parts =
+        SupervisorParts { experiment, control: session_end, ticks, sinks, recorder: status, checklist, approval, info };
+    let mut supervisor = supervise(parts, maker, &options, settings, &clock)?;
     let storage = supervisor.storage_watch();
     if let Ok((granted, denied)) = scheduled.recv() {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }
-    let sits_down = options.backend == Backend::Hardware;
     let (report, news) = channel();
     let observers = match folder.recording.is_some().then(|| admit_observers(&options, &console_end.stop, report)) {
         Some(Err(error)) => {
             let message = format!("{error}: this session cannot be watched with quadfrog attach");
-            supervisor.report_warning(message, clock.now_ns());
+            supervisor.log(LogLevel::Warning, message, clock.now_ns());
             None
         }
         server => server.transpose().unwrap_or_default(),
     };
-    let inhibits = sits_down && !options.observe && SleepLock::available();
+    let inhibits = hardware && !options.observe && SleepLock::available();
     let sleep_lock = match inhibits.then(|| SleepLock::take(Path::new(INHIBITOR))).transpose() {
         Ok(lock) => lock,
         Err(error) => {
             let message = format!("{INHIBITOR} cannot be run ({error}): the computer may suspend; {ALLOW_INHIBITOR}");
-            supervisor.report_warning(message, clock.now_ns());
+            supervisor.log(LogLevel::Warning, message, clock.now_ns());
             None
         }
     };
+    let (to_supervisor, requests) = channel();
     let session = std::thread::Builder::new()
         .name("session".into())
-        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &news, &clock, sits_down))
-        .map_err(system("session thread"))?;
+        .spawn(move || session_thread::run(supervisor, guard, sleep_lock, &requests, &news, &clock, hardware))
+        .map_err(EngineError::not_started("session thread"))?;
 
     Ok(EngineHandle {
         console: console_end,
@@ -207,11 +164,50 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         requests: Some(to_supervisor),
         clock,
         records: console_records,
-        closing,
-        control: Some(control),
         session: Some(session),
-        recorder: Some(recorder),
+        threads,
     })
+}
+
+/// Returns the simulated robot, or the real one with its guard.
+fn open_robot_and_guard(
+    options: &Options,
+    settings: &ControlSettings,
+) -> Result<(Box<dyn Robot>, Option<(Guard, GuardHeartbeat)>), EngineError> {
+    match options.backend {
+        Backend::Simulator => Ok((Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None)),
+        Backend::Hardware => {
+            let no_network = || EngineError::NoNetwork { robot: options.robot.name.clone() };
+            let network = options.network.as_ref().ok_or_else(no_network)?;
+            let priority = options.config.scheduling(options.backend).priority;
+            let (robot, route) = open_robot(network, settings.gate.damping_kd, priority)?;
+            let post = |program: &PathBuf| Guard::start(program, route, settings);
+            let guard = options.guard.as_ref().map(post).transpose().map_err(EngineError::not_started("guard"))?;
+            Ok((robot, guard))
+        }
+    }
+}
+
+/// Returns the session with the thread of its storage; `maker` makes the prior of its sampler behind it.
+fn supervise(
+    parts: SupervisorParts,
+    maker: Option<PriorMaker>,
+    options: &Options,
+    settings: ControlSettings,
+    clock: &MonotonicClock,
+) -> Result<Supervisor, EngineError> {
+    let hardware = options.backend == Backend::Hardware;
+    let review_sits_down = hardware && options.config.safety.failsafe.hardware_review_sits_down;
+    let mut supervisor = Supervisor::new(parts, clock.now_ns())
+        .approving(options.approve, !hardware)
+        .naming_limits(settings)
+        .sitting_down_for_review(review_sits_down && !options.observe)
+        .with_storage_thread()
+        .map_err(EngineError::not_started("storage thread"))?;
+    if let Some(maker) = maker {
+        make_prior(&mut supervisor, maker, options, clock.now_ns());
+    }
+    Ok(supervisor)
 }
 
 /// Opens the robot in a thread below the control thread's `priority`: threads that a robot's library starts inherit it. The
@@ -231,7 +227,7 @@ fn open_robot(network: &Network, damping_kd: f64, priority: u8) -> Result<Opened
 fn make_prior(supervisor: &mut Supervisor, maker: PriorMaker, options: &Options, time_ns: u64) {
     if options.observe {
         let message = "this session only observes: without a prior the sampler sim proposes nothing";
-        return supervisor.report_warning(message.to_owned(), time_ns);
+        return supervisor.log(LogLevel::Warning, message.to_owned(), time_ns);
     }
     let files = maker.files(options);
     supervisor.make_prior(time_ns, move |work| {
@@ -300,10 +296,8 @@ pub struct EngineHandle {
     requests: Option<Sender<StampedRequest>>,
     clock: MonotonicClock,
     records: Receiver<Stamped>,
-    closing: Arc<AtomicBool>,
-    control: Option<JoinHandle<()>>,
     session: Option<JoinHandle<(Supervisor, Option<Guard>)>>,
-    recorder: Option<RecorderHandle>,
+    threads: EngineThreads,
 }
 
 impl EngineHandle {
@@ -324,12 +318,12 @@ impl EngineHandle {
 
     /// Returns the recorder's status; none where nothing is kept.
     pub fn recorder(&self) -> Option<RecorderStatus> {
-        self.recording.as_ref().and(self.recorder.as_ref()).map(|recorder| recorder.status())
+        self.recording.as_ref().and(self.threads.recorder()).map(|recorder| recorder.status())
     }
 
     /// Returns a view of the recorder's status that outlives the session; none where nothing is kept.
     pub fn recorder_watch(&self) -> Option<RecorderWatch> {
-        self.recording.as_ref().and(self.recorder.as_ref()).map(RecorderHandle::watch)
+        self.recording.as_ref().and(self.threads.recorder()).map(RecorderHandle::watch)
     }
 
     /// Returns the state of the live view; none without one.
@@ -401,10 +395,7 @@ impl EngineHandle {
         // Each thread ends after the one that feeds it: the session, then control, then the recorder. A panic was reported
         // when it happened.
         let session = self.session.take().map(JoinHandle::join);
-        self.closing.store(true, Ordering::Release);
-        if let Some(control) = self.control.take() {
-            let _ = control.join();
-        }
+        self.threads.end_control();
         // A STOP has no effect from here on, and none is confirmed.
         self.observers = None;
         if let Some(Ok((supervisor, guard))) = session {
@@ -414,9 +405,7 @@ impl EngineHandle {
                 guard.end();
             }
         }
-        if let Some(recorder) = self.recorder.take() {
-            let _ = recorder.join();
-        }
+        self.threads.end_recorder();
     }
 }
 

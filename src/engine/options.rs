@@ -152,3 +152,10 @@ pub enum EngineError {
     #[error("{what}: {source}")]
     System { what: String, source: std::io::Error },
 }
+
+impl EngineError {
+    /// Returns the conversion of the system's error at the start of `what`.
+    pub(super) fn not_started(what: &'static str) -> impl Fn(std::io::Error) -> EngineError {
+        move |source| EngineError::System { what: format!("the {what} could not be started"), source }
+    }
+}

@@ -8,6 +8,7 @@ use super::observers::SessionNews;
 use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
+use crate::recording::record::LogLevel;
 use crate::session::operator_request::StampedRequest;
 use crate::session::supervisor::Supervisor;
 use crate::telemetry::Mode;
@@ -35,7 +36,7 @@ pub fn run(
     requests: &Receiver<StampedRequest>,
     news: &Receiver<SessionNews>,
     clock: &MonotonicClock,
-    sits_down: bool,
+    hardware: bool,
 ) -> (Supervisor, Option<Guard>) {
     let mut guard_state = GuardState::Answering;
     loop {
@@ -51,13 +52,13 @@ pub fn run(
         if sleep_lock.as_mut().is_some_and(SleepLock::lost) {
             let message =
                 format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
-            supervisor.report_warning(message, clock.now_ns());
+            supervisor.log(LogLevel::Warning, message, clock.now_ns());
         }
         for (level, message) in news.try_iter() {
-            supervisor.report(level, message, clock.now_ns());
+            supervisor.log(level, message, clock.now_ns());
         }
         // A real robot is taken control of with a key: another program may command it.
-        if supervisor.mode() == Mode::Observe && (!sits_down || supervisor.control_wanted()) {
+        if supervisor.mode() == Mode::Observe && (!hardware || supervisor.control_wanted()) {
             supervisor.take_control();
         }
         match requests.recv_timeout(SESSION_PERIOD) {
@@ -68,11 +69,11 @@ pub fn run(
     }
     let begun = clock.now_ns();
     let within = |begun: u64, limit: Duration| clock.now_ns() - begun < limit.as_nanos() as u64;
-    while supervisor.end_session_step(sits_down) && within(begun, LONGEST_SIT_DOWN) {
+    while supervisor.end_session_step(hardware) && within(begun, LONGEST_SIT_DOWN) {
         std::thread::sleep(SESSION_PERIOD);
         supervisor.poll(clock.now_ns());
     }
-    if sits_down {
+    if hardware {
         supervisor.stop();
         let begun = clock.now_ns();
         // Until nothing is energised. A control thread that does not report that any more damps by itself.

@@ -157,7 +157,7 @@ pub struct Candidate {
     pub values: Vec<f64>,
     /// TPE: the joint sample behind it, by name, including parameters that were fixed; empty if none was drawn.
     pub joint: Vec<(String, f64)>,
-    /// What the sampler's model expects of a trial there; none for a sampler without a model of the objective.
+    /// Expectation of the sampler's model of a trial there; none for a sampler without a model of the objective.
     pub expected: Option<Expectation>,
 }
 
@@ -167,7 +167,7 @@ impl From<Vec<f64>> for Candidate {
     }
 }
 
-/// What a model expects of a trial before it runs.
+/// Expectation of a model of a trial before it runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Expectation {
     /// Mean of the objective if the robot stands, in the objective's unit.
@@ -184,7 +184,7 @@ pub struct Expectation {
     pub worth_the_risk: bool,
 }
 
-/// What a model says of a finished trial, after it has learned from all of them.
+/// Prediction of a model of a finished trial, after it has learned from all of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
     /// Number of the trial.

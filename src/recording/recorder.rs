@@ -51,11 +51,20 @@ pub struct RecorderStatus {
     pub file: PathBuf,
     /// Number of files begun.
     pub files: u32,
-    /// First error. One of the present file ended the recording, which keeps its name `*.mcap.part`; after one of the next file,
-    /// or of the file before, the recording goes on. None without an error.
+    /// Error of the present file, which ended the recording and keeps its name `*.mcap.part`. None without an error.
     pub error: Option<String>,
+    /// First error of another file, which could not be begun or completed: the recording goes on in the present one. None without
+    /// an error.
+    pub warning: Option<String>,
     /// Whether the last file is complete and has its final name.
     pub finished: bool,
+}
+
+impl RecorderStatus {
+    /// Returns the error of the present file, or of another one; none for a recording that is complete so far.
+    pub fn incomplete(&self) -> Option<&str> {
+        self.error.as_deref().or(self.warning.as_deref())
+    }
 }
 
 /// Shared view of the state of the recording.
@@ -147,7 +156,8 @@ impl Recorder {
             let (finished, trouble) = writer.finish();
             let mut status = self.status.lock().unwrap_or_else(PoisonError::into_inner);
             status.finished = finished.is_ok();
-            status.error = finished.err().or(trouble).map(|error| error.to_string());
+            status.error = finished.err().map(|error| error.to_string());
+            status.warning = trouble.map(|error| error.to_string());
         }
         if let Some(failed) = self.failed.take() {
             failed.abandon();
@@ -215,8 +225,8 @@ impl Recorder {
         if status.file != writer.path() {
             status.file = writer.path().to_path_buf();
         }
-        if status.error.is_none() {
-            status.error = writer.trouble().map(ToString::to_string);
+        if status.warning.is_none() {
+            status.warning = writer.trouble().map(ToString::to_string);
         }
     }
 

@@ -121,7 +121,7 @@ impl<'a> TaskStudies<'a> {
         Figure::new(self.file("convergence"), caption, 1, [panel])
     }
 
-    /// What the sampler expected of the trials of each study beside what came: the value with its deviation and the spread of the
+    /// Expectation of the sampler beside the result of each trial: the value with its deviation and the spread of the
     /// simulated robots, and the probability of standing. None without an expectation.
     pub fn expectations(&self) -> Option<Figure> {
         let expecting = self.studies.iter().filter(|study| study.expecting().next().is_some());

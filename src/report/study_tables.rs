@@ -81,7 +81,7 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
     table
 }
 
-/// How the expectations of the sampler's model agree with what came; none without an expectation.
+/// Agreement of the expectations of the sampler's model with the results; none without an expectation.
 pub fn expectations(studies: &[&ReportedStudy]) -> Option<Table> {
     let unit = studies[0].unit.as_str();
     let columns = [

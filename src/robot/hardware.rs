@@ -44,7 +44,7 @@ pub enum HardwareError {
     NoController { robot: &'static str },
 }
 
-/// How a second process damps the robot when this one does not answer any more.
+/// Way by which a second process damps the robot when this one does not answer any more.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[expect(missing_docs, reason = "the doc of the variant describes its fields")]
 pub enum DampingRoute {

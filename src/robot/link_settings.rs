@@ -3,10 +3,10 @@
 use super::description::{DescriptionError, RobotFiles};
 use super::state_counter::StateClock;
 
-/// What is read alike on every link.
+/// Settings that are the same on every link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkSettings {
-    /// How the robot's clock is read.
+    /// Reading of the robot's clock: period and restart.
     pub clock: StateClock,
     /// Time that a motor may take to report servo mode after the first command, ms.
     pub servo_grace_ms: u32,

@@ -6,7 +6,7 @@
 use super::recent_count::RecentCount;
 use super::{LinkStatus, robot_time_passed};
 
-/// How the robot's clock is read.
+/// Reading of the robot's clock: period and restart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StateClock {
     /// Time between two states on the robot's clock, ms.

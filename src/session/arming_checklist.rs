@@ -187,8 +187,8 @@ impl ArmingChecklist {
     }
 
     fn recorder(&self, status: &RecorderStatus) -> ArmingCheckRecord {
-        let (state, found) = match (&status.error, &self.folder) {
-            (Some(error), _) => (ArmingCheckState::Failed, error.clone()),
+        let (state, found) = match (status.incomplete(), &self.folder) {
+            (Some(error), _) => (ArmingCheckState::Failed, error.to_owned()),
             (None, Some(_)) if status.finished => (ArmingCheckState::Failed, "has ended".to_owned()),
             (None, Some(_)) => (ArmingCheckState::Passed, "recording".to_owned()),
             // A simulation may run without a recording, a real robot may not.

@@ -123,7 +123,10 @@ pub fn run_watched<R: Robot>(
         waited = None;
         if experiment.refusal().is_some() {
             // Another program has queued a point outside the limits: it is void with this cause.
-            experiment.skip()?;
+            match experiment.skip(proposal.trial, proposal.revision) {
+                Err(RequestRefusal::Overtaken(_)) => {}
+                skipped => skipped?,
+            }
             continue;
         }
         let spec = match experiment.approve(proposal.trial, proposal.revision) {

@@ -3,7 +3,7 @@
 use super::objective;
 use super::rollout::Rollout;
 use crate::robot::Robot;
-use crate::telemetry::{Phase, Tick, TrialEnd, TrialSpec};
+use crate::telemetry::{TrialEnd, TrialSpec};
 use crate::trial::MeasuredJump;
 
 /// Result of one run of a point.
@@ -54,14 +54,15 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
         let angles = ticks.iter().map(|tick| tick.estimate.roll_pitch_yaw[axis]);
         angles.clone().fold(f64::NEG_INFINITY, f64::max) - angles.fold(f64::INFINITY, f64::min)
     };
-    let starts: Vec<f64> = impulse_edges(ticks, true).map(objective::tilt_rad).collect();
+    let starts: Vec<f64> =
+        objective::impulse_edges(ticks, true).map(|index| objective::tilt_rad(&ticks[index])).collect();
     let value = measured.as_ref().and_then(|measured| measured.measured_value);
     let (_, cause) = objective::suggest_measured(&end, measured.as_ref(), spec.bounce);
     EvaluatedRun {
         seed: spec.seed,
         fall_time_s: (matches!(end, TrialEnd::Fell(_)) || objective::trips_limit(&end))
             .then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
-        jumps: impulse_edges(ticks, false).count() as u32,
+        jumps: objective::impulse_edges(ticks, false).count() as u32,
         value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
         cause,
         measured,
@@ -70,15 +71,4 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
         pitch_range_rad: if ticks.is_empty() { 0.0 } else { range(1) },
         end,
     }
-}
-
-/// Returns the first ticks of the impulses, or the first ticks after them.
-fn impulse_edges(ticks: &[Tick], rising: bool) -> impl Iterator<Item = &Tick> {
-    let mut before = false;
-    ticks.iter().filter(move |tick| {
-        let impulse = tick.phase == Phase::Impulse;
-        let edge = impulse != before && impulse == rising;
-        before = impulse;
-        edge
-    })
 }

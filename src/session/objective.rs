@@ -71,6 +71,21 @@ pub fn value(rule: &ObjectiveRule, measured: &MeasuredJump) -> f64 {
     whole / f64::from(jumps.max(1))
 }
 
+/// Returns verdict, value and cause of a trial of several rollouts, from verdict and value of those that are not void: the mean
+/// with 0 for a fall, and a fall if all fell.
+pub fn judge_repeats(counted: &[(Verdict, Option<f64>)]) -> (Verdict, Option<f64>, String) {
+    let falls = counted.iter().filter(|(verdict, _)| *verdict == Verdict::Fall).count();
+    let of_one = |(verdict, value): &(Verdict, Option<f64>)| if *verdict == Verdict::Fall { Some(0.0) } else { *value };
+    let verdict = if falls == counted.len() { Verdict::Fall } else { Verdict::Accept };
+    (verdict, mean(counted.iter().filter_map(of_one)), format!("mean of {} repeats, {falls} fell", counted.len()))
+}
+
+/// Returns the mean; none without values.
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
 /// Whether the robot flew again after its first landing.
 fn bounced(measured: &MeasuredJump) -> bool {
     measured.flights > 1
@@ -145,12 +160,14 @@ impl Landing {
     }
 }
 
-/// Returns the first ticks of the impulses, by index.
-fn impulse_starts(ticks: &[Tick]) -> Vec<usize> {
-    let begins = |index: &usize| {
-        ticks[*index].phase == Phase::Impulse && (*index == 0 || ticks[index - 1].phase != Phase::Impulse)
+/// Returns the first ticks of the impulses, or with `rising` false the first ticks after them, by index.
+pub(super) fn impulse_edges(ticks: &[Tick], rising: bool) -> impl Iterator<Item = usize> {
+    let impulse = move |index: usize| ticks[index].phase == Phase::Impulse;
+    let edge = move |index: &usize| {
+        let before = *index > 0 && impulse(index - 1);
+        impulse(*index) == rising && before != rising
     };
-    (0..ticks.len()).filter(begins).collect()
+    (0..ticks.len()).filter(edge)
 }
 
 fn jumps(
@@ -159,7 +176,7 @@ fn jumps(
     airborne: &[AirborneTicks],
     displacement: impl Fn(&Tick) -> Displacement,
 ) -> Vec<JumpRow> {
-    let starts = impulse_starts(ticks);
+    let starts: Vec<usize> = impulse_edges(ticks, true).collect();
     let row = |(number, &start): (usize, &usize)| {
         let next = starts.get(number + 1).copied();
         let window = start..next.unwrap_or(ticks.len());

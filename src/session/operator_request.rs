@@ -75,8 +75,8 @@ pub enum OperatorRequest {
     Approve { trial: u32, revision: u32 },
     /// Cancel the countdown.
     Cancel,
-    /// Refuse the proposal; the sampler proposes another.
-    Skip,
+    /// Refuse the proposal as it was seen; the sampler proposes another.
+    Skip { trial: u32, revision: u32 },
     /// Set one parameter of the proposal, in its unit.
     Override { parameter: String, value: f64 },
     /// Set one of the controller's gains (`kp`, `kd`, `kd_joint` or `k_att`) for the proposed trial, in its unit.
@@ -128,7 +128,7 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::Acknowledge => f.write_str("acknowledge"),
             OperatorRequest::Approve { trial, .. } => write!(f, "approve trial {trial}"),
             OperatorRequest::Cancel => f.write_str("cancel the countdown"),
-            OperatorRequest::Skip => f.write_str("skip the proposal"),
+            OperatorRequest::Skip { trial, .. } => write!(f, "skip trial {trial}"),
             OperatorRequest::Override { parameter, value } => {
                 write!(f, "override {parameter} = {}", six_digits(*value))
             }

@@ -31,7 +31,7 @@ impl Judgement {
             return single;
         }
         let values = row.repeats.iter().filter_map(|repeat| repeat.value);
-        Judgement { value: mean(values), ..single }
+        Judgement { value: objective::mean(values), ..single }
     }
 
     fn measured(measured: Option<MeasuredJump>, verdict: Option<Verdict>, cause: String) -> Judgement {
@@ -55,27 +55,17 @@ impl Judgement {
         if let Some((index, open)) = repeats.iter().enumerate().find(|(_, repeat)| repeat.verdict.is_none()) {
             return Judgement::unknown(format!("repeat {}: {}", index + 1, open.cause));
         }
-        let counted = || repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void));
-        let falls = counted().filter(|repeat| repeat.verdict == Some(Verdict::Fall)).count();
-        let of_one = |repeat: &Judgement| if repeat.verdict == Some(Verdict::Fall) { Some(0.0) } else { repeat.value };
-        let verdict = if falls == counted().count() { Verdict::Fall } else { Verdict::Accept };
-        Judgement {
-            value: mean(counted().filter_map(of_one)),
-            measured: repeats.last().and_then(|repeat| repeat.measured.clone()),
-            verdict: Some(verdict),
-            cause: format!("mean of {} repeats, {falls} fell", counted().count()),
-        }
+        let judged = repeats.iter().filter_map(|repeat| Some((repeat.verdict?, repeat.value)));
+        let counted: Vec<_> = judged.filter(|(verdict, _)| *verdict != Verdict::Void).collect();
+        let (verdict, value, cause) = objective::judge_repeats(&counted);
+        let measured = repeats.last().and_then(|repeat| repeat.measured.clone());
+        Judgement { value, measured, verdict: Some(verdict), cause }
     }
 
     /// Returns a judgement without a verdict, for a reason.
     pub fn unknown(cause: String) -> Judgement {
         Judgement { value: None, measured: None, verdict: None, cause }
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// Returns the row of a rollout of a trial with several, as if it were a trial of its own.

@@ -50,7 +50,7 @@ impl<R: Robot> Rollout<R> {
         self.transitions.clear();
         // The cycle ends a trial `cap_s` after its last impulse at the latest; a longer one is an error of this program.
         let pause_s = 0.5 / spec.jump.f1_hz.max(0.05) + spec.landing_wait_s;
-        let profile_s = f64::from(spec.jumps) * (0.5 / spec.jump.f0_hz + pause_s);
+        let profile_s = f64::from(spec.jumps) * (spec.jump.impulse_s() + pause_s);
         let most = ticks_in(self.settings.countdown_s + profile_s + self.settings.settle.cap_s + 1.0);
         for number in 0..most {
             inputs.time_ns = u64::from(number) * (CONTROL_PERIOD_S * 1e9) as u64;

@@ -66,7 +66,7 @@ impl ExperimentView {
     }
 }
 
-/// What is waited for while the prior of the sampler `sim` is made.
+/// Name of the wait for the prior of the sampler `sim`.
 const PRIOR: &str = "the simulated robots of the sampler sim";
 
 /// Wait of the session for the storage of its study.
@@ -74,7 +74,7 @@ const PRIOR: &str = "the simulated robots of the sampler sim";
 pub struct StorageWait {
     /// Time since the oldest unfinished job was given.
     pub waited: Duration,
-    /// What the journal waits for; none where the disk is slow.
+    /// Cause of the journal's wait; none where the disk is slow.
     pub journal: Option<WaitedFor>,
     /// Progress of the prior of the sampler, where that is what is waited for.
     pub prior: Option<PriorProgress>,
@@ -229,11 +229,6 @@ impl ExperimentQueue {
     /// State after the last job that was taken.
     pub fn view(&self) -> &ExperimentView {
         &self.view
-    }
-
-    /// Whether a job is not finished.
-    pub fn is_busy(&self) -> bool {
-        !self.unfinished.is_empty()
     }
 
     /// Whether the thread has ended by a panic: nothing is carried out any more.

@@ -22,7 +22,7 @@ use super::spatial::{SpatialForce, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints};
 
-/// What a flight step leaves for the next one.
+/// Values that a flight step leaves for the next one.
 #[derive(Debug, Clone)]
 pub(super) struct FlightMemory {
     /// Equations at the end of the step, with the predicted velocities.

@@ -164,9 +164,14 @@ impl JumpParameters {
 }
 
 impl JumpParameters {
+    /// Duration of one impulse, s.
+    pub fn impulse_s(&self) -> f64 {
+        0.5 / self.f0_hz
+    }
+
     /// Duration of one impulse and the pause after it, s; infinite without a pause.
-    fn period_s(&self) -> f64 {
-        0.5 / self.f0_hz + if self.f1_hz > 0.0 { 0.5 / self.f1_hz } else { f64::INFINITY }
+    pub fn period_s(&self) -> f64 {
+        self.impulse_s() + if self.f1_hz > 0.0 { 0.5 / self.f1_hz } else { f64::INFINITY }
     }
 
     /// Returns the number of impulses that begin within `duration_s`, at least one.
@@ -332,7 +337,7 @@ pub struct Proposal {
     pub parameters: Vec<ProposedParameter>,
     /// Distance to earlier falls; none before the first judged trial.
     pub risk: Option<FallRisk>,
-    /// What the sampler's model expects of the values that run; none for a sampler without a model.
+    /// Expectation of the sampler's model of the values that run; none for a sampler without a model.
     pub expected: Option<ExpectedResult>,
     /// The controller's gains, in table order; `proposed` is the configured value.
     pub gains: Vec<ProposedParameter>,
@@ -366,7 +371,7 @@ pub struct FallRisk {
     pub neighbours: u32,
 }
 
-/// What the sampler's model expects of a trial before it runs.
+/// Expectation of the sampler's model of a trial before it runs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ExpectedResult {
     /// Mean objective if the robot stands, in the study's unit.
@@ -438,7 +443,7 @@ pub struct TrialRecord {
     pub note: String,
     /// Distance to earlier falls at its approval.
     pub risk: Option<FallRisk>,
-    /// What the sampler's model expected at its approval.
+    /// Expectation of the sampler's model at its approval.
     pub expected: Option<ExpectedResult>,
     /// The controller's gains that it ran with; empty for a trial of another program.
     pub gains: ParameterValues,

@@ -78,7 +78,7 @@ pub struct ProposalInsight {
     pub trial: u32,
     /// Every parameter, in table order.
     pub parameters: Vec<ParameterInsight>,
-    /// What the sampler's model says of the finished trials, in the order of their numbers; empty without a model.
+    /// Predictions of the sampler's model of the finished trials, in the order of their numbers; empty without a model.
     pub predicted: Vec<PredictedTrial>,
     /// The trial that is the best by the model: the largest mean among those that stood, since a single jump may be lucky.
     pub best: Option<u32>,
@@ -93,7 +93,7 @@ impl ProposalInsight {
     }
 }
 
-/// What a model says of a finished trial.
+/// Prediction of a model of a finished trial.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PredictedTrial {
     /// Its number.

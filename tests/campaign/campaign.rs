@@ -69,7 +69,7 @@ enum Kind {
 pub enum Passed {
     /// With what is worth a word in the table.
     Tried(String),
-    /// What is missing on this machine.
+    /// Reason: something is missing on this machine.
     Skipped(String),
 }
 

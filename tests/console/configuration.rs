@@ -4,6 +4,8 @@
 mod program;
 #[path = "../support/python_reader.rs"]
 mod python_reader;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::fs;
 use std::path::{Path, PathBuf};

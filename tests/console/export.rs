@@ -3,6 +3,8 @@
 
 #[path = "support/program.rs"]
 mod program;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::fs;
 use std::path::Path;
@@ -12,6 +14,7 @@ use program::{Program, assert_shows, with_small_files};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
 use serde_json::Value;
+use skip::skip;
 
 /// A recording of two trials of the program, as an argument.
 fn recording(program: &Program) -> String {
@@ -35,7 +38,7 @@ fn pandas_and_polars_read_what_the_mcap_reader_gives() {
     let check = "import pandas, polars, pyarrow, mcap_protobuf";
     let found = Command::new("python3").args(["-c", check]).output().is_ok_and(|output| output.status.success());
     if !found {
-        println!("skipped: python3 has no pandas, polars, pyarrow and mcap-protobuf-support");
+        skip("python3 has no pandas, polars, pyarrow and mcap-protobuf-support");
         return;
     }
     let program = Program::new();
@@ -193,7 +196,7 @@ fn the_layout_of_foxglove_names_topics_and_fields_of_a_recording() {
 fn rerun_takes_the_blueprint_that_the_script_writes() {
     let found = Command::new("python3").args(["-c", "import rerun.blueprint"]).output();
     if !found.is_ok_and(|output| output.status.success()) {
-        println!("skipped: python3 has no rerun-sdk");
+        skip("python3 has no rerun-sdk");
         return;
     }
     let program = Program::new();

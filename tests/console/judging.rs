@@ -278,7 +278,7 @@ fn letters_typed_without_a_dialog_never_skip_a_proposal() {
         assert_eq!(console.said(), "cancelled: not skipped");
         assert_eq!(console.requests(&["n"]), []);
         assert_shows(&console.screen(80, 24), &["Skip the proposal?", "Trial #0", "Press y to skip trial #0"]);
-        assert_eq!(console.requests(&["y"]), [OperatorRequest::Skip]);
+        assert_eq!(console.requests(&["y"]), [OperatorRequest::Skip { trial: 0, revision: 0 }]);
         console.press(&["n"]);
         console.record(Record::Proposal(proposal(0, 1)));
         assert_eq!(console.requests(&["y"]), [], "another proposal than the one of the question");

@@ -6,6 +6,8 @@ mod program;
 mod pty;
 #[path = "../support/python_reader.rs"]
 mod python_reader;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};

@@ -4,12 +4,15 @@
 
 #[path = "support/program.rs"]
 mod program;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::path::Path;
 use std::process::Command;
 
 use program::{Program, assert_shows};
 use serde_json::{Value, json};
+use skip::skip;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 /// A zone without UTC: a local time that is taken for UTC is seen.
@@ -39,7 +42,7 @@ impl Optuna {
         );
         let found = self.python().args(["-c", &check]).output().is_ok_and(|output| output.status.success());
         if !found {
-            println!("skipped: python3 has no Optuna {version}x with pandas, pyarrow, plotly and sqlalchemy");
+            skip(&format!("python3 has no Optuna {version}x with pandas, pyarrow, plotly and sqlalchemy"));
         }
         found
     }

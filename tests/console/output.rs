@@ -1,4 +1,4 @@
-//! What the commands print: no control character of any file, name or argument reaches the terminal, a full disk behind
+//! Output of the commands: no control character of any file, name or argument reaches the terminal, a full disk behind
 //! standard output is an error, colours and defect reports.
 
 #[path = "support/program.rs"]

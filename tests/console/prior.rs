@@ -4,6 +4,8 @@
 mod program;
 #[path = "support/pty.rs"]
 mod pty;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
@@ -13,6 +15,7 @@ use std::process::Command;
 use program::{Program, assert_shows};
 use pty::Session;
 use serde_json::Value;
+use skip::skip;
 
 /// The program with a configuration of a small prior in `mine`.
 fn small() -> Program {
@@ -174,7 +177,7 @@ print(json.dumps({"first": max(values[:5]), "best": max(values)}))
 #[test]
 fn a_python_program_optimizes_its_own_function() {
     if Command::new("python3").arg("--version").output().is_err() {
-        println!("skipped: there is no python3");
+        skip("there is no python3");
         return;
     }
     let run = |seed: &str| {

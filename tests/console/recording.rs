@@ -6,6 +6,8 @@ mod program;
 mod pty;
 #[path = "../support/python_reader.rs"]
 mod python_reader;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,6 +20,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Mode;
 use serde_json::Value;
+use skip::skip;
 
 const SIZE: (u16, u16) = (100, 30);
 
@@ -120,7 +123,7 @@ fn rerun_finds_the_transforms() {
             Ok(output) if output.status.success() => Some(String::from_utf8_lossy(&output.stdout).into_owned()),
             Ok(output) => panic!("rerun {arguments:?}: {}", String::from_utf8_lossy(&output.stderr)),
             Err(error) => {
-                println!("skipped: pip install rerun-sdk ({error})");
+                skip(&format!("rerun of rerun-sdk cannot be started: {error}"));
                 None
             }
         }

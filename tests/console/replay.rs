@@ -14,9 +14,11 @@ use portable_pty::CommandBuilder;
 use program::{Program, assert_shows};
 use pty::Session;
 use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::SessionInfo;
 use quadfrog::recording::session_files::recordings_in;
 use quadfrog::recording::timeline::{Timeline, TrialRun};
-use quadfrog::telemetry::Phase;
+use quadfrog::recording::writer::Writer;
+use quadfrog::telemetry::{Mode, Phase, Tick};
 use quadfrog::trial::Verdict;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Msg, ReplayCommand, ReplayStatus};
@@ -211,6 +213,30 @@ fn status(feed: &mut Feed, milliseconds: u64) -> ReplayStatus {
         _ => None,
     });
     status.unwrap()
+}
+
+/// Regression: at the start of a recording, before its first tick, the robot of the end was shown.
+#[test]
+fn a_time_without_ticks_shows_no_robot_of_another_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let mut writer = Writer::create(&path, &SessionInfo::default(), 0, &[]).unwrap();
+    for number in 1..=2000 {
+        let time_ns = 1_000_000_000 + number * 1_000_000;
+        writer.tick(&Tick { number, time_ns, mode: Mode::Ready, ..Tick::default() }).unwrap();
+    }
+    writer.finish().unwrap();
+    let mut feed = Feed::replay(Timeline::open(&[path]).unwrap());
+    let mut mode_at = |command: ReplayCommand| {
+        feed.control_replay(command);
+        let newest = feed.poll(0).into_iter().rev().find_map(|message| match message {
+            Msg::Snapshot(snapshot) => Some(snapshot.tick.mode),
+            _ => None,
+        });
+        newest.unwrap()
+    };
+    assert_eq!(mode_at(ReplayCommand::End), Mode::Ready);
+    assert_eq!(mode_at(ReplayCommand::Start), Mode::Offline);
 }
 
 #[test]

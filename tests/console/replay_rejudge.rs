@@ -40,7 +40,7 @@ fn trials(size: (u16, u16), arguments: &[&str]) -> Session {
     session
 }
 
-/// What `quadfrog rejudge` prints.
+/// Output of `quadfrog rejudge`.
 fn expected(config: &str) -> Vec<Value> {
     let (program, file) = recorded();
     program.trials(&["rejudge", file.to_str().unwrap(), "--config", config, "--json"])

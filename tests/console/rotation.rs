@@ -6,6 +6,8 @@ mod program;
 mod pty;
 #[path = "../support/python_reader.rs"]
 mod python_reader;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -192,6 +194,26 @@ fn a_file_that_cannot_be_begun_is_reported_and_the_recording_goes_on() {
     let mut player = Player::open(study.join("session.mcap")).unwrap();
     assert_eq!(trials_of(&ticks(player.by_ref())).len(), 3, "nothing is lost");
     assert_eq!(player.damage(), None);
+}
+
+/// Regression: the approval was refused with "nothing is recorded", while the present file went on.
+#[test]
+fn a_console_session_says_that_the_next_file_could_not_be_begun() {
+    let program = Program::new();
+    program.write("small/control.toml", SMALL);
+    program.text(&["optimize", "--trials", "1", "--record", "none"]);
+    let study = program.study("recordings");
+    std::fs::create_dir(study.join("session-2.mcap.new")).unwrap();
+    let config = program.path("small");
+    let resumed = [study.to_str().unwrap(), config.to_str().unwrap()];
+    let arguments = ["--approve", "auto", "--trials", "6", "--resume", resumed[0], "--config", resumed[1]];
+    let mut session = Session::start(program.path("").as_path(), (160, 40), &arguments);
+    session.send("6");
+    session.wait_for_long("the cause", || session.screen().contains("could not be begun or completed"));
+    assert!(!session.screen().contains("nothing is recorded"), "{}", session.screen());
+    session.send("qy");
+    session.wait_for(&["the recording is not complete"]);
+    assert_eq!(session.wait().exit_code(), 1);
 }
 
 /// Starts a long study and kills it as soon as `count` files have been begun; returns its folder.

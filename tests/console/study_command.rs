@@ -2,6 +2,8 @@
 
 #[path = "support/program.rs"]
 mod program;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::fs;
 use std::path::Path;
@@ -9,6 +11,7 @@ use std::process::{Command, Stdio};
 
 use program::{Program, assert_shows, counted_trials, hold};
 use serde_json::Value;
+use skip::skip;
 
 /// A finished study of six trials, and its folder.
 fn study(task: &str) -> (Program, String) {
@@ -176,7 +179,7 @@ fn a_closed_output_pipe_is_no_error() {
 fn python_reads_our_table_and_we_read_its_journal_and_its_table() {
     let has = Command::new("python3").args(["-c", "import optuna, pandas"]).stderr(Stdio::null()).status();
     if !has.is_ok_and(|status| status.success()) {
-        println!("skipped: python3 has no optuna with pandas");
+        skip("python3 has no optuna with pandas");
         return;
     }
     let (program, ours) = study("forward");

@@ -1,4 +1,4 @@
-//! What the screen says is so now, or says of when it is.
+//! The screen shows the present, or the time of what it shows.
 
 mod support;
 

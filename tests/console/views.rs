@@ -18,7 +18,7 @@ use quadfrog_console::settings::{BellCause, ConsoleSettings, DEFAULT};
 use quadfrog_console::text;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use strum::VariantArray;
-use support::{Console, assert_shows, line_with, tick, trial};
+use support::{Console, assert_shows, line_with, session, tick, trial};
 
 /// A console after the jumps of some trials, each a second after the one before; roll depends on the trial.
 fn jumped(trials: &[u32]) -> Console {
@@ -576,6 +576,18 @@ fn jumping_in_a_row() -> Console {
 fn jumps_in_a_row_are_counted_while_they_run_with_the_values_of_the_last() {
     let console = jumping_in_a_row();
     assert_shows(&console.screen(120, 40), &["Jump 2 of 3; the last +0.80 m, rise 0.30 m.", "sit down"]);
+}
+
+/// A replay that goes to another time counts the jumps from there.
+#[test]
+fn the_jumps_of_another_time_of_a_replay_are_not_counted() {
+    let mut console = jumping_in_a_row();
+    console.update(Msg::Rewound);
+    console.record(Record::Session(session()));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Running, trial: 0, can_undo: false, jumps: 3 }));
+    console.mode(Mode::Jump);
+    console.tick(tick(3_100, 0.0, Some((0, 2.1, Phase::Impulse))));
+    assert_shows(&console.screen(120, 40), &["Jump 1 of 3."]);
 }
 
 /// Sitting down between jumps drops the further ones; a single jump cannot be sat down.

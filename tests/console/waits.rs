@@ -5,6 +5,8 @@
 mod program;
 #[path = "support/pty.rs"]
 mod pty;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -14,6 +16,7 @@ use std::process::{Child, Command, Stdio};
 
 use program::{Program, assert_shows};
 use pty::Session;
+use skip::skip;
 
 /// A study of two trials.
 fn study(program: &Program) -> PathBuf {
@@ -111,7 +114,7 @@ fn threads_that_the_system_does_not_grant_are_an_error() {
         .arg(&copy)
         .args(["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"]);
     let Ok(output) = command.current_dir(program.path("")).output() else {
-        println!("skipped: setpriv is not installed");
+        skip("setpriv is not installed");
         return;
     };
     let message = String::from_utf8_lossy(&output.stderr);

@@ -5,6 +5,8 @@
 mod program;
 #[path = "../support/redis.rs"]
 mod redis;
+#[path = "../support/skip.rs"]
+mod skip;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, BufReader};
@@ -16,6 +18,7 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
 use redis::{Ended, server};
 use serde_json::Value;
+use skip::skip;
 
 /// Number of trials of all workers together.
 const BUDGET: usize = 400;
@@ -116,7 +119,7 @@ fn four_workers_on_a_redis_server_one_of_them_killed_meet_the_budget_to_the_tria
 fn a_python_worker_joins_the_study() {
     let has = Command::new("python3").args(["-c", "import optuna"]).stderr(Stdio::null()).status();
     if !has.is_ok_and(|status| status.success()) {
-        println!("skipped: python3 has no optuna");
+        skip("python3 has no optuna");
         return;
     }
     let program = abandoning();

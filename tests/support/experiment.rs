@@ -109,6 +109,11 @@ pub fn approve(experiment: &mut Experiment) -> TrialSpec {
     experiment.approve(proposal.trial, proposal.revision).unwrap()
 }
 
+pub fn skip(experiment: &mut Experiment) {
+    let proposal = experiment.proposal().expect("a proposal");
+    experiment.skip(proposal.trial, proposal.revision).unwrap();
+}
+
 /// Approves the proposal and ends its trial with `end`, up to the review.
 pub fn run(experiment: &mut Experiment, end: TrialEnd) -> TrialSpec {
     let spec = approve(experiment);
@@ -130,6 +135,17 @@ pub fn parameters(experiment: &Experiment) -> Vec<f64> {
 /// Returns the study in `folder`, as another program reads it.
 pub fn study_in(folder: &Path) -> Study {
     study(Storage::File(folder.join("study.log")))
+}
+
+/// Calls `act` while the journal in `folder` can be neither read nor written.
+pub fn without_journal<T>(folder: &Path, act: impl FnOnce() -> T) -> T {
+    let (journal, aside) = (folder.join("study.log"), folder.join("aside.log"));
+    std::fs::rename(&journal, &aside).unwrap();
+    std::fs::create_dir(&journal).unwrap();
+    let result = act();
+    std::fs::remove_dir(&journal).unwrap();
+    std::fs::rename(&aside, &journal).unwrap();
+    result
 }
 
 /// Opens the study in `folder` as a session does.

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 /// The folder of golden data: the environment variable `QUADFROG_GOLDEN` where it is set, `tests/golden` otherwise.
@@ -23,6 +24,25 @@ pub fn golden<T: DeserializeOwned>(name: &str) -> T {
     let path = golden_folder().join(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A golden file with a list of cases.
+#[derive(Deserialize)]
+struct GoldenCases<T> {
+    cases: Vec<T>,
+}
+
+/// Reads the cases of `folder/name` in the golden folder, or of `name` if the golden folder is `folder` itself.
+pub fn golden_cases<T: DeserializeOwned>(folder: &str, name: &str) -> Vec<T> {
+    let nested = format!("{folder}/{name}");
+    let name = if golden_folder().join(&nested).exists() { &nested } else { name };
+    golden::<GoldenCases<T>>(name).cases
+}
+
+/// Returns the bytes of a text of hexadecimal digits.
+pub fn bytes(hex: &str) -> Vec<u8> {
+    assert!(hex.len().is_multiple_of(2));
+    (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect()
 }
 
 /// The largest absolute difference and where it was.

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::skip::skip;
 use serde_json::Value;
 
 /// Returns what a script of this folder prints of a recording, one JSON object; none where Python or its packages are absent.
@@ -13,13 +14,13 @@ pub fn read_by_python(script: &str, recording: &Path) -> Option<Value> {
     let output = match Command::new("python3").arg(script).arg(recording).output() {
         Ok(output) => output,
         Err(error) => {
-            println!("skipped: python3 cannot be started: {error}");
+            skip(&format!("python3 cannot be started: {error}"));
             return None;
         }
     };
     let stderr = String::from_utf8_lossy(&output.stderr);
     if output.status.code() == Some(77) {
-        println!("skipped: pip install mcap mcap-protobuf-support ({})", stderr.trim());
+        skip(&format!("python3 has no mcap and mcap-protobuf-support: {}", stderr.trim()));
         return None;
     }
     assert!(output.status.success(), "{stderr}");

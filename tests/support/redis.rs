@@ -5,6 +5,7 @@ use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::skip::skip;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 
@@ -40,7 +41,7 @@ pub fn start(port: u16, arguments: &[&str]) -> Option<Ended> {
     let port_text = port.to_string();
     let common = ["--port", &port_text, "--bind", "127.0.0.1"];
     let Ok(child) = Command::new("redis-server").args(common).args(arguments).stdout(Stdio::null()).spawn() else {
-        println!("skipped: redis-server is not installed");
+        skip("redis-server is not installed");
         return None;
     };
     let server = Ended(child);

@@ -1,6 +1,6 @@
 //! Detection of a dead SSH connection under the terminal.
 //!
-//! A connection that dies without closing (Wi-Fi, an unplugged cable) leaves the terminal open: output is buffered, and the
+//! A connection that ends without closing (Wi-Fi, an unplugged cable) leaves the terminal open: output is buffered, and the
 //! operator cannot press STOP. The kernel retransmits data that the peer does not acknowledge, each time after twice the
 //! wait, and counts the retransmissions in `/proc/net/tcp` (Linux, Documentation/networking/proc_net_tcp.rst). The screen
 //! is drawn several times a second, so there is always data to acknowledge.

@@ -163,7 +163,7 @@ fn may_sit_down(model: &Model) -> Legality {
     match (mode::next(model.mode(), Trigger::SitDown), model.mode()) {
         (Some(_), _) => Ok(()),
         // Jumps in a row: the further ones are dropped.
-        (None, Mode::Jump) if model.session.jumps_in_a_row() > 1 => Ok(()),
+        (None, Mode::Jump | Mode::Settle) if model.session.jumps_in_a_row() > 1 => Ok(()),
         (None, Mode::Disarmed) => refuse("the robot is disarmed already"),
         (None, mode) => refuse(busy_reason(mode).unwrap_or("not now")),
     }

@@ -42,7 +42,7 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// Forgets everything, after a placement.
+    /// Resets every measure, after a placement.
     pub fn reset(&mut self) {
         *self = Consistency::default();
     }

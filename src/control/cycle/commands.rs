@@ -32,8 +32,11 @@ impl Cycle {
         if matches!(trigger, Trigger::SitDown | Trigger::Cancel) {
             self.lowered_ns = inputs.time_ns + inputs.lateness_ns;
         }
-        // A jump cannot be sat down; between jumps in a row the further ones are dropped, then the robot sits down.
-        if trigger == Trigger::SitDown && self.mode == Mode::Jump && self.drop_further_jumps(TrialEnd::SatDown) {
+        // A jump cannot be sat down; of jumps in a row the further ones are dropped, and the robot sits down in REVIEW.
+        let in_a_row = self.trial.as_ref().is_some_and(RunningTrial::is_in_a_row);
+        if trigger == Trigger::SitDown && in_a_row && matches!(self.mode, Mode::Jump | Mode::Settle) {
+            self.drop_further_jumps(TrialEnd::SatDown);
+            self.sits_down_after.get_or_insert(TransitionCause::Command);
             return;
         }
         if let Some(because) = self.refusal(command, trigger, inputs) {
@@ -53,6 +56,7 @@ impl Cycle {
                 self.trial = Some(RunningTrial::begin(spec, &self.settings));
                 self.trial_ticks = 0;
                 self.dropped = None;
+                self.sits_down_after = None;
             }
             Command::Arm(_) => {
                 // The robot may have been carried since the last arming, which voids position and velocity.

@@ -61,13 +61,11 @@ impl Cycle {
         }
     }
 
-    /// Drops the jumps that have not begun; the trial ends with `end` once the robot has landed. Returns whether there were any.
-    pub(super) fn drop_further_jumps(&mut self, end: TrialEnd) -> bool {
-        let dropped = self.trial.as_mut().is_some_and(RunningTrial::land);
-        if dropped {
+    /// Drops the jumps that have not begun, if any; the trial ends with `end` then, once the robot has landed.
+    pub(super) fn drop_further_jumps(&mut self, end: TrialEnd) {
+        if self.trial.as_mut().is_some_and(RunningTrial::land) {
             self.dropped.get_or_insert(end);
         }
-        dropped
     }
 
     /// Begins the impulse of a robot that is ready for it; otherwise cancels the countdown.

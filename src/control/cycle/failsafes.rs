@@ -6,7 +6,7 @@ use crate::control::mode::Trigger;
 use crate::control::running_trial::FallWatch;
 use crate::robot::Robot;
 use crate::robot::ticks_in;
-use crate::telemetry::{Fault, Mode, Tick, TransitionCause, TrialEnd};
+use crate::telemetry::{Fault, Mode, Tick, TransitionCause};
 
 /// Ticks for which a warning stays set; the session reads it at 10 Hz.
 pub(super) const WARNING_TICKS: u32 = 1000;
@@ -17,7 +17,7 @@ impl Cycle {
     /// 1. The strictest row of the failsafe table that trips. DAMP ends the list, also at the end of a landing with a fault.
     /// 2. Landing, after the end of the session.
     /// 3. Damping for a fall in REVIEW. It is no fault, so the verdict is asked for as after any other fall.
-    /// 4. Sitting down, after jumps in a row that the operator has ended so.
+    /// 4. Sitting down in REVIEW, after LAND during the trial or the operator's request during jumps in a row.
     /// 5. Sitting down, after too long a wait in READY or REVIEW.
     pub(super) fn run_failsafes<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, restarted: bool, robot: &R) {
         self.failsafe.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
@@ -69,8 +69,10 @@ impl Cycle {
         } else if let Some(cause) = self.fall.update(state, estimate, &self.settings, stance_tilt_rad) {
             self.trigger(Trigger::Fell, TransitionCause::Fell(cause));
         }
-        if self.mode == Mode::Review && self.dropped.take() == Some(TrialEnd::SatDown) {
-            self.trigger(Trigger::SitDown, TransitionCause::Command);
+        if self.mode == Mode::Review
+            && let Some(cause) = self.sits_down_after.take()
+        {
+            self.trigger(Trigger::SitDown, cause);
         }
         let allowed_s = self.settings.idle_s;
         if matches!(self.mode, Mode::Ready | Mode::Review) && allowed_s > 0.0 && self.mode_ticks > ticks_in(allowed_s) {
@@ -90,18 +92,21 @@ impl Cycle {
         }
     }
 
-    /// Sits down at once, or in a jump after the landing. SETTLE runs to its end, so that the trial can be measured.
+    /// Sits down at once, or in a jump after the landing, also if the cause is gone by then. SETTLE runs to its end, so that
+    /// the trial can be measured.
     fn land_and_sit_down(&mut self, fault: Fault) {
         match self.mode {
             Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::Review => {
                 self.trigger(Trigger::SitDown, TransitionCause::Fault(fault));
             }
             Mode::Jump => {
-                self.landing.get_or_insert(fault);
+                let first = *self.landing.get_or_insert(fault);
+                self.sits_down_after = Some(TransitionCause::Fault(first));
                 if let Some(jump) = &mut self.trial {
                     jump.land();
                 }
             }
+            Mode::Settle => self.sits_down_after = Some(TransitionCause::Fault(self.landing.unwrap_or(fault))),
             _ => {}
         }
     }

@@ -117,6 +117,8 @@ pub struct Cycle {
     session_left: bool,
     /// End of a trial of which jumps in a row were dropped.
     dropped: Option<TrialEnd>,
+    /// Cause for which the robot sits down in REVIEW: a request during jumps in a row, or LAND, whose own cause may be gone.
+    sits_down_after: Option<TransitionCause>,
     /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
     lowered_ns: u64,
     tick: Tick,
@@ -155,6 +157,7 @@ impl Cycle {
             gains: GainBlend::default(),
             session_left: false,
             dropped: None,
+            sits_down_after: None,
             lowered_ns: 0,
             tick: Tick::default(),
             events: Events::default(),

@@ -18,12 +18,12 @@ const STOP_PERIOD: Duration = Duration::from_millis(10);
 /// A session that runs on this machine under this user.
 #[derive(Debug)]
 pub struct RunningSession {
-    /// What it is.
+    /// Facts about the session.
     pub facts: SessionFacts,
     reader: BufReader<UnixStream>,
 }
 
-/// What was found in the folders of sockets.
+/// Sessions in the folders of sockets.
 #[derive(Debug, Default)]
 pub struct FoundSessions {
     /// The sessions that run, by the number of their process.

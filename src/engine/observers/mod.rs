@@ -24,7 +24,7 @@ pub use server::ObserverServer;
 /// Longest line either end accepts, bytes.
 const LONGEST_LINE: u64 = 16_384;
 
-/// What observers do, for the session's log.
+/// Log line about an observer, for the session.
 pub type SessionNews = (LogLevel, String);
 
 /// Facts of a running session, for those who want to observe it.
@@ -46,7 +46,7 @@ pub struct SessionFacts {
     pub since: String,
 }
 
-/// What an observer sends.
+/// Message of an observer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Demand {
@@ -56,7 +56,7 @@ enum Demand {
     Stop,
 }
 
-/// What the session sends.
+/// Message of the session.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Answer {

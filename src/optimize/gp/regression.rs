@@ -238,16 +238,6 @@ impl Regression {
         (0..self.linear.mean.len()).map(posterior).collect()
     }
 
-    /// Mean and variance of h' beta + delta at each observed point, from all other observations   (R&W 5.12)
-    pub fn left_out(&self, values: &[f64]) -> Vec<(f64, f64)> {
-        let inverse = self.factor.inverse();
-        let without = |i: usize| {
-            let variance = 1.0 / inverse[(i, i)];
-            (values[i] - self.alpha[i] * variance, (variance - self.hyper.noise).max(0.0))
-        };
-        (0..values.len()).map(without).collect()
-    }
-
     /// The hyperparameters.
     pub fn hyperparameters(&self) -> &Hyperparameters {
         &self.hyper

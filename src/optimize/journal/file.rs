@@ -4,6 +4,7 @@ use super::error::JournalError;
 use super::wait::{JournalWait, LongWait, WaitedFor};
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -143,7 +144,10 @@ impl JournalFile {
             }
             // A symbolic link to the journal, as Optuna's default lock.
             match std::os::unix::fs::symlink(&self.path, &self.lock) {
-                Ok(()) => return Ok(JournalLock { path: self.lock.clone() }),
+                Ok(()) => match LinkIdentity::of(&self.lock) {
+                    Some(identity) => return Ok(JournalLock { path: self.lock.clone(), identity }),
+                    None => continue,
+                },
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(JournalError::io("lock", &self.lock, e)),
             }
@@ -173,24 +177,38 @@ impl JournalFile {
         }
     }
 
-    /// Appends whole lines in one write. `_lock` proves that the lock is held; `rest` is first moved to `<path>.torn-<n>`.
-    pub(super) fn append(&self, _lock: &JournalLock, rest: &UnreadTail, lines: &str) -> Result<(), JournalError> {
+    /// Appends whole lines in one write, or nothing; `rest` is first moved to `<path>.torn-<n>`. Returns false, with nothing
+    /// changed, if another writer has broken the lock: this program was stopped for longer than the grace time, and
+    /// `rest` may be the beginning of that writer's lines.
+    pub(super) fn append(&self, lock: &JournalLock, rest: &UnreadTail, lines: &str) -> Result<bool, JournalError> {
         let io = |e| JournalError::io("append to", &self.path, e);
         let fresh = self.offset == 0 && !self.path.exists();
         let mut file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        if length != self.offset + rest.bytes.len() as u64 || !lock.is_held() {
+            return Ok(false);
+        }
         if !rest.bytes.is_empty() {
             self.keep_aside(&rest.bytes)?;
             file.set_len(self.offset).map_err(io)?;
         }
-        file.write_all(lines.as_bytes()).map_err(io)?;
-        if self.durability == Durability::Synced {
-            file.sync_data().map_err(io)?;
-            if fresh && let Some(folder) = self.path.parent() {
-                // A new name is durable only after a sync of its folder.
-                File::open(folder).and_then(|f| f.sync_all()).map_err(io)?;
+        let synced = self.durability == Durability::Synced;
+        let written = file.write_all(lines.as_bytes()).and_then(|()| if synced { file.sync_data() } else { Ok(()) });
+        if let Err(error) = written {
+            // On a full disk the first lines may be whole: half a commit, which every reader would apply.
+            if lock.is_held() {
+                file.set_len(self.offset).map_err(io)?;
             }
+            return Err(io(error));
         }
-        Ok(())
+        if synced
+            && fresh
+            && let Some(folder) = self.path.parent()
+        {
+            // A new name is durable only after a sync of its folder.
+            File::open(folder).and_then(|f| f.sync_all()).map_err(io)?;
+        }
+        Ok(true)
     }
 
     fn keep_aside(&self, bytes: &[u8]) -> Result<(), JournalError> {
@@ -206,14 +224,38 @@ impl JournalFile {
     }
 }
 
+/// Identity of a symbolic link: inode and time of its creation, because inode numbers are used again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct LinkIdentity {
+    inode: u64,
+    created: (i64, i64),
+}
+
+impl LinkIdentity {
+    fn of(link: &Path) -> Option<LinkIdentity> {
+        let metadata = fs::symlink_metadata(link).ok()?;
+        Some(LinkIdentity { inode: metadata.ino(), created: (metadata.mtime(), metadata.mtime_nsec()) })
+    }
+}
+
 /// The lock of a journal, released when dropped.
 pub(super) struct JournalLock {
     path: PathBuf,
+    identity: LinkIdentity,
+}
+
+impl JournalLock {
+    /// Whether no other writer has broken the lock.
+    fn is_held(&self) -> bool {
+        LinkIdentity::of(&self.path) == Some(self.identity)
+    }
 }
 
 impl Drop for JournalLock {
     fn drop(&mut self) {
-        release(&self.path);
+        if self.is_held() {
+            release(&self.path);
+        }
     }
 }
 

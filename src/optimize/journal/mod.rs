@@ -117,7 +117,7 @@ impl Journal {
     }
 
     /// Appends the operations that `decide` returns for the newest state; no other line comes in between. `decide` is called
-    /// again if another writer of a Redis journal was faster. Returns the result of each operation.
+    /// again if another writer of a Redis journal was faster, or has broken the lock of a file. Returns the result of each operation.
     ///
     /// # Errors
     /// The error of `decide`, with nothing written; [`JournalError`] if the journal cannot be read or written.
@@ -134,9 +134,7 @@ impl Journal {
             let appended = match (&mut self.backend, &lock) {
                 _ if operations.is_empty() => return Ok(Vec::new()),
                 (JournalBackend::Redis(redis), _) => redis.append(&lines.collect::<Vec<_>>())?,
-                (JournalBackend::File(file), Some(lock)) => {
-                    file.append(lock, &tail, &lines.collect::<String>()).map(|()| true)?
-                }
+                (JournalBackend::File(file), Some(lock)) => file.append(lock, &tail, &lines.collect::<String>())?,
                 _ => return Ok(operations.into_iter().map(|o| self.state.apply(o, &self.worker)).collect()),
             };
             drop(lock);

@@ -10,7 +10,7 @@ use strum::FromRepr;
 /// A wait is printed after this time.
 const NOTICED_AFTER: Duration = Duration::from_secs(1);
 
-/// What a journal waits for.
+/// Cause of a journal's wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, FromRepr)]
 #[repr(u8)]
 pub enum WaitedFor {
@@ -36,7 +36,7 @@ pub struct JournalWait(Arc<WaitState>);
 
 #[derive(Debug, Default)]
 struct WaitState {
-    /// What is waited for; 0 for nothing.
+    /// Cause of the wait; 0 for none.
     waits_for: AtomicU8,
     /// Number of the present job.
     job: AtomicU64,

@@ -50,7 +50,7 @@ pub struct SlipParameters {
     pub vertical: String,
 }
 
-/// Reason for which a prior is not used; the sampler proposes as `gp` then.
+/// Reason for which a prior cannot be used (`docs/prior.md`, section 2).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant has its meaning")]
 pub enum PriorModelError {

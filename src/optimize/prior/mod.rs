@@ -53,7 +53,7 @@ impl PriorModel {
     /// prior its surfaces return to the worlds' means.
     ///
     /// # Errors
-    /// The reason for which the sampler proposes as `gp`.
+    /// The reason for which the prior cannot be used (`docs/prior.md`, section 2).
     pub fn covers(&self, space: &Space) -> Result<(), PriorModelError> {
         self.ensemble.as_ref().map_err(Clone::clone)?;
         let names = |parameters: &[Parameter]| {

@@ -1,7 +1,7 @@
-//! What the model has learned of the robot, for the operator; the sampler does not read it.
+//! Findings of the model about the robot, for the operator; the sampler does not read them.
 
 use super::history::History;
-use super::model::{StandingModel, ValueModel};
+use super::model::ValueModel;
 use super::safeguard;
 use crate::optimize::ask::Direction;
 use crate::optimize::gp::laplace::sigmoid;
@@ -23,7 +23,7 @@ pub struct MeanAndDeviation {
     pub deviation: f64,
 }
 
-/// How well one simulated robot explains the jumps.
+/// Weight of one simulated robot by its likelihood.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WorldWeight {
     /// Name of the world.
@@ -32,18 +32,7 @@ pub struct WorldWeight {
     pub weight: f64,
 }
 
-/// The model's prediction of a finished trial from all others.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ObservedPrediction {
-    /// Number of the trial.
-    pub number: u32,
-    /// Value, if the robot stands, in the objective's unit and sign, without the noise of a trial.
-    pub value: MeanAndDeviation,
-    /// Probability of standing from all trials, the trial itself among them, 0..1.
-    pub p_stand: f64,
-}
-
-/// What the model has learned.
+/// Findings of the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PriorInsight {
     /// rho: how much of the simulated change over the points the robot shows; 1 for a robot as simulated.
@@ -52,8 +41,6 @@ pub struct PriorInsight {
     pub bias: MeanAndDeviation,
     /// The simulated robots in their order.
     pub worlds: Vec<WorldWeight>,
-    /// The finished trials in order.
-    pub observed: Vec<ObservedPrediction>,
     /// ln of the likelihood of the values with the simulated robots over that without them.
     pub log_bayes_factor: f64,
     /// Whether the sampler uses the simulated values; see [`safeguard`].
@@ -66,20 +53,9 @@ pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Op
     let history = History::gather(prior, ensemble, trials, direction);
     let sign = if direction == Direction::Maximize { 1.0 } else { -1.0 };
     let about = ValueModel::fit(ensemble, &history)?;
-    let standing = StandingModel::fit(ensemble, &history)?;
     let coefficients = about.coefficients();
     let worlds = weights(prior, ensemble, &history);
     let checked = safeguard::check(about, ensemble, &history)?;
-    let scaled: Vec<f64> = history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect();
-    let mut left_out = checked.value.left_out(&scaled).into_iter();
-    let observed = history.jumps.iter().map(|jump| {
-        let left_out = if jump.stood { left_out.next() } else { None };
-        let (mean, variance) = left_out.unwrap_or_else(|| checked.value.predict(&jump.point, &jump.features.value));
-        let mean = sign * (ensemble.offset + ensemble.scale * mean);
-        let value = MeanAndDeviation { mean, deviation: ensemble.scale * sqrt(variance) };
-        let p_stand = standing.probability(&jump.point, &jump.features.standing);
-        ObservedPrediction { number: jump.number, value, p_stand }
-    });
     let estimate = |(mean, variance): (f64, f64), unit: f64| MeanAndDeviation {
         mean: unit * mean,
         deviation: unit.abs() * sqrt(variance),
@@ -88,7 +64,6 @@ pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Op
         rho: estimate(coefficients[1], 1.0),
         bias: estimate(coefficients[0], sign * ensemble.scale),
         worlds,
-        observed: observed.collect(),
         log_bayes_factor: checked.log_bayes_factor,
         trusted: checked.trusted,
     })

@@ -126,16 +126,6 @@ impl ValueModel {
             None => self.linear.mean.iter().copied().zip(self.linear.variance.iter().copied()).collect(),
         }
     }
-
-    /// Mean and variance at each jump that stood, from all others; see [`Regression::left_out`].
-    pub fn left_out(&self, values: &[f64]) -> Vec<(f64, f64)> {
-        self.regression.as_ref().map_or_else(Vec::new, |regression| regression.left_out(values))
-    }
-
-    /// The hyperparameters of delta and of the noise.
-    pub fn hyperparameters(&self) -> &Hyperparameters {
-        &self.hyper
-    }
 }
 
 /// Maximum a posteriori; with many observations from an even choice of [`FITTED`] among them.
@@ -187,12 +177,6 @@ impl StandingModel {
         StandingModel::about(history, terms, linear, STANDING.1)
     }
 
-    /// Fits a model without prior: a constant and a signal about it.
-    pub fn without_prior(history: &History) -> Option<StandingModel> {
-        let linear = LinearPrior { mean: vec![0.5], variance: vec![1.5 * 1.5] };
-        StandingModel::about(history, vec![vec![1.0]; history.jumps.len()], linear, 4.0)
-    }
-
     fn about(history: &History, terms: Vec<Vec<f64>>, linear: LinearPrior, signal: f64) -> Option<StandingModel> {
         let points: Vec<Vec<f64>> = history.jumps.iter().map(|jump| jump.point.clone()).collect();
         let stood: Vec<bool> = history.jumps.iter().map(|jump| jump.stood).collect();
@@ -208,11 +192,6 @@ impl StandingModel {
             Some(Laplace::fit(&k, &mean, &stood)?)
         };
         Some(StandingModel { points, terms, linear, hyper, laplace })
-    }
-
-    /// ln q(labels)
-    pub fn log_evidence(&self) -> f64 {
-        self.laplace.as_ref().map_or(0.0, |laplace| laplace.log_evidence)
     }
 
     /// The probability of standing at a point with its linear terms, averaged over the uncertainty.

@@ -59,7 +59,7 @@ pub struct Acquisition<'a> {
     void: Vec<Vec<f64>>,
 }
 
-/// What speaks for a point, the weakest first.
+/// Reason to choose a point, the weakest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Reason {
     /// Not even that it stands: the surest is the best.
@@ -70,7 +70,7 @@ enum Reason {
     Gain,
 }
 
-/// How good a point is: among points of one reason the larger merit.
+/// Rank of a point: reason, then merit.
 #[derive(Debug, Clone, Copy)]
 struct Score {
     reason: Reason,

@@ -25,14 +25,14 @@ pub struct ModelBest {
     pub learned: u32,
 }
 
-/// What the sampler's model says of the finished trials.
+/// Predictions of the sampler's model of the finished trials.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ModelPredictions {
     /// Every finished trial, in the order of the numbers; empty without a model or before it has enough trials.
     pub trials: Vec<Prediction>,
     /// The best of those that stood.
     pub best: Option<ModelBest>,
-    /// What the sampler `sim` has learned of robot and simulator; none for another sampler and without a prior.
+    /// Findings of the sampler `sim` about robot and simulator; none for another sampler and without a prior.
     pub simulator: Option<PriorInsight>,
 }
 
@@ -44,7 +44,7 @@ impl Study {
         by_model.or_else(|| repeats::best(self.trials(), self.options.direction))
     }
 
-    /// What the sampler's model says of the finished trials.
+    /// Returns the predictions of the sampler's model of the finished trials.
     pub fn predict(&self) -> ModelPredictions {
         let trials = sampler::predict(&self.ask(&[]));
         let best_first = |a: &&Prediction, b: &&Prediction| self.options.direction.best_first(a.value, b.value);

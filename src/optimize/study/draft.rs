@@ -48,7 +48,7 @@ pub struct TrialDraft {
     pub attributes: BTreeMap<String, Value>,
     /// The joint sample of TPE, by name; announced to other workers.
     pub joint: Vec<(String, f64)>,
-    /// What the sampler's model expects of the trial at the values above.
+    /// Expectation of the sampler's model of the trial at the values above.
     pub expected: Option<Expectation>,
     /// Seed of the random streams.
     pub seed: u32,
@@ -151,6 +151,28 @@ impl Study {
         attributes: &[(String, Value)],
         room: impl Fn(&[Trial]) -> bool,
     ) -> Result<u32, StudyError> {
+        self.begin_as(draft, overrides, attributes, room, TrialState::Running)
+    }
+
+    /// [`Study::begin_if`] of a trial that is not run: it has failed already, in the same commit.
+    pub fn begin_skipped(
+        &mut self,
+        draft: &TrialDraft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+        room: impl Fn(&[Trial]) -> bool,
+    ) -> Result<u32, StudyError> {
+        self.begin_as(draft, overrides, attributes, room, TrialState::Fail)
+    }
+
+    fn begin_as(
+        &mut self,
+        draft: &TrialDraft,
+        overrides: &[(String, f64)],
+        attributes: &[(String, Value)],
+        room: impl Fn(&[Trial]) -> bool,
+        state: TrialState,
+    ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };
         if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
@@ -190,6 +212,9 @@ impl Study {
                 Operation::SetParameter { trial: id, name: s.name.clone(), value, distribution }
             }));
             operations.extend(user_attributes(id, attributes));
+            if state != TrialState::Running {
+                operations.push(Operation::SetState { trial: id, state, values: None, at: now });
+            }
             Ok(operations)
         })?;
         self.streams.advance_to(draws);

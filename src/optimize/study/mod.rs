@@ -131,7 +131,8 @@ impl Study {
         }
     }
 
-    /// Gives the results of simulated robots to the sampler `sim`; without them it proposes as `gp`.
+    /// Gives the results of simulated robots to the sampler `sim`. Without them, or where its model cannot be fitted, it proposes as
+    /// `gp`; [`Expectation::worlds`](crate::optimize::ask::Expectation::worlds) of the draft is none then.
     pub fn use_prior(&mut self, prior: Arc<PriorModel>) {
         self.prior = Some(prior);
     }

@@ -12,7 +12,7 @@ pub struct Draft {
     pub toml: String,
     /// The robot as the draft describes it.
     pub robot: RobotDescription,
-    /// What is missing or guessed, one sentence each, with the remedy.
+    /// Missing and guessed values, one sentence each, with the remedy.
     pub missing: Vec<String>,
 }
 

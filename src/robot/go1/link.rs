@@ -44,7 +44,7 @@ pub struct LinkOptions {
     pub address: SocketAddr,
     /// Local port; 0 takes any free one.
     pub local_port: u16,
-    /// How the robot's clock is read.
+    /// Reading of the robot's clock: period and restart.
     pub clock: StateClock,
 }
 

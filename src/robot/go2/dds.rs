@@ -441,7 +441,7 @@ fn write_commands(
     }
 }
 
-/// What is not another program's.
+/// Identity of the commands of this program and its guard.
 struct Ours {
     participant: ParticipantIdentity,
     guards_command: [u8; COMMAND_LENGTH],

@@ -1,5 +1,6 @@
 //! A trial between its rollouts.
 
+use super::plan::{RequestRefusal, must_be};
 use crate::trial::TrialRecord;
 
 /// A trial of which further rollouts are to be done.
@@ -13,5 +14,10 @@ pub struct BetweenRepeats {
 impl BetweenRepeats {
     pub fn trial(&self) -> u32 {
         self.suggestion.trial
+    }
+
+    /// Refuses a request that was made for another proposal.
+    pub fn must_be(&self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
+        must_be((self.trial(), self.revision), (trial, revision))
     }
 }

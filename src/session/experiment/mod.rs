@@ -239,41 +239,31 @@ impl Experiment {
             return self.approve_repeat(trial, revision);
         }
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to approve") };
-        if !open.is(trial, revision) {
-            return not_now(format!(
-                "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
-                open.number()
-            ));
-        }
+        open.must_be(trial, revision)?;
         if let Some(refusal) = self.refusal() {
             return not_now(format!("{refusal}; change it, or refuse the proposal"));
         }
         let approved = open.approved();
-        let number = self.begin(approved)?;
+        let number = self.begin(approved, None)?;
         self.enter(ExperimentState::Running(number), number);
         Ok(self.spec(number))
     }
 
-    /// Refuses the proposal: it becomes a void trial, which the sampler does not see.
-    /// Refused when there is no proposal.
-    pub fn skip(&mut self) -> Result<(), RequestRefusal> {
+    /// Refuses the proposal as it was seen: it becomes a void trial, which the sampler does not see.
+    /// Refused when there is another proposal by now, or none.
+    pub fn skip(&mut self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
         if let ExperimentState::BetweenRepeats(between) = &self.state {
-            return self.give_up(between.trial());
+            between.must_be(trial, revision)?;
+            return self.give_up(trial);
         }
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to skip") };
+        open.must_be(trial, revision)?;
         let cause = match self.refusal() {
             Some(refusal) => format!("not run: {refusal}"),
             None => "skipped before the jump".to_owned(),
         };
         let approved = open.approved();
-        let number = self.begin(approved)?;
-        if let Some(row) = self.rows.get_mut(&number) {
-            row.verdict = Some(Verdict::Void);
-            row.cause = cause;
-        }
-        self.write_judgement(number, false)?;
-        self.study.tell(number, Outcome::Fail)?;
-        self.publish_row(number);
+        self.begin(approved, Some(cause))?;
         self.propose()?;
         Ok(())
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::attributes::Origin;
+use super::plan::{RequestRefusal, must_be};
 use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
 use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
@@ -41,7 +42,7 @@ pub struct Changes {
     gains: BTreeMap<String, f64>,
 }
 
-/// The values of a open proposals at its approval.
+/// Values of an open proposal at its approval.
 pub struct ApprovedProposal {
     pub proposal: Proposal,
     pub origin: Origin,
@@ -78,8 +79,9 @@ impl OpenProposal {
         self.draft.number
     }
 
-    pub fn is(&self, trial: u32, revision: u32) -> bool {
-        self.number() == trial && self.revision == revision
+    /// Refuses a request that was made for another proposal.
+    pub fn must_be(&self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
+        must_be((self.number(), self.revision), (trial, revision))
     }
 
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
@@ -173,6 +175,12 @@ impl OpenProposal {
             repeat: 0,
             repeats: 0,
         }
+    }
+
+    /// Whether the sampler `sim` has proposed without its model, as `gp`.
+    pub fn lacks_prior(&self) -> bool {
+        let about_worlds = self.draft.expected.is_some_and(|expected| expected.worlds.is_some());
+        self.study.options().sampler.kind == SamplerKind::Sim && !about_worlds
     }
 
     /// Returns the distance to earlier falls; none before the first trial that counts.

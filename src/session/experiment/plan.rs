@@ -28,6 +28,15 @@ pub fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
     Err(RequestRefusal::NotNow(reason.into()))
 }
 
+/// Refuses a request that was made for another proposal than the open one, each given by its trial and its revision.
+pub fn must_be(open: (u32, u32), seen: (u32, u32)) -> Result<(), RequestRefusal> {
+    if open == seen {
+        return Ok(());
+    }
+    let (trial, new) = (seen.0, open.0);
+    not_now(format!("the proposal for trial {trial} has changed since it was shown; check the new one (trial {new})"))
+}
+
 /// Settings that all trials of one study share.
 #[expect(missing_docs, reason = "the types say the rest")]
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! The next proposal, and its start as a running trial.
 
-use super::attributes::{self, BeganAttributes, Origin};
+use super::attributes::{self, BeganAttributes, JudgedAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
 use super::judging::value_of;
@@ -16,7 +16,7 @@ use crate::recording::record::{LogLevel, LogRecord, Record};
 use crate::telemetry::TrialSpec;
 use crate::trial::{
     JumpParameters, ParameterInfo, ParameterValues, ProposalInsight, ProposalSource, ProposedParameter, SearchStatus,
-    TrialRecord,
+    TrialRecord, Verdict,
 };
 
 impl Experiment {
@@ -65,6 +65,10 @@ impl Experiment {
         let revision = self.next_revision();
         let open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
         let number = open.number();
+        if open.lacks_prior() {
+            let message = format!("trial {number} is proposed as by gp: the model of sim cannot be fitted");
+            self.outbox.push(Record::Log(LogRecord { level: LogLevel::Warning, source: "study".to_owned(), message }));
+        }
         self.outbox.push(Record::Insight(open.insight(&model)));
         self.outbox.push(Record::Proposal(open.proposal()));
         self.enter(ExperimentState::Proposed(Box::new(open)), number);
@@ -160,8 +164,9 @@ impl Experiment {
         Ok(fork)
     }
 
-    /// Makes the approved proposal a running trial of the study. Returns its number.
-    pub fn begin(&mut self, approved: ApprovedProposal) -> Result<u32, RequestRefusal> {
+    /// Makes the approved proposal a running trial of the study; with a cause in `skipped` one that has ended void, in the same
+    /// commit. Returns its number.
+    pub fn begin(&mut self, approved: ApprovedProposal, skipped: Option<String>) -> Result<u32, RequestRefusal> {
         let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_verdict } = approved;
         let mut queued = self.report_verdict()?;
         if only_with_verdict {
@@ -181,7 +186,16 @@ impl Experiment {
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
         let room = |trials: &[Trial]| beyond_budget || queue.occupied(trials) < budget;
-        let number = match self.study.begin_if(&draft, &overrides, &attributes::write(&began), room) {
+        let verdict = skipped.is_some().then_some(Verdict::Void);
+        let judged = TrialRecord { verdict, cause: skipped.unwrap_or_default(), ..TrialRecord::default() };
+        let mut attributes = attributes::write(&began);
+        let begun = if verdict.is_some() {
+            attributes.extend(attributes::write(&JudgedAttributes::of(&judged, false)));
+            self.study.begin_skipped(&draft, &overrides, &attributes, room)
+        } else {
+            self.study.begin_if(&draft, &overrides, &attributes, room)
+        };
+        let number = match begun {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {
                 self.propose()?;
@@ -202,7 +216,7 @@ impl Experiment {
             repeats: origin.repeats,
             seed: Some(seed),
             ranges: self.study.trial(number).map(attributes::ranges_of).unwrap_or_default(),
-            ..TrialRecord::default()
+            ..judged
         };
         if !row.note.is_empty() {
             // The sampler learns from this trial like from any other; the note shows that the controller differed.

@@ -2,11 +2,12 @@
 //! the rollouts that count, with 0 for a fall; a void rollout is done again. A judged rollout is on disk when it is shown: after a
 //! crash the trial is queued again with it.
 
-use super::attributes::{self, RepeatsAttribute};
+use super::attributes::{self, JudgedAttributes, RepeatsAttribute};
 use super::between_repeats::BetweenRepeats;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};
-use crate::optimize::study::{Outcome, StudyError};
+use crate::optimize::study::{Outcome, StudyError, TellOutcome};
+use crate::session::objective;
 use crate::telemetry::TrialSpec;
 use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
 
@@ -37,12 +38,7 @@ impl Experiment {
         let ExperimentState::BetweenRepeats(between) = &self.state else {
             return not_now("there is no repeat to approve");
         };
-        if (between.trial(), between.revision) != (trial, revision) {
-            return not_now(format!(
-                "the proposal for trial {trial} has changed since it was shown; check the new one (trial {}) and approve it",
-                between.trial()
-            ));
-        }
+        between.must_be(trial, revision)?;
         self.enter(ExperimentState::Running(trial), trial);
         Ok(self.spec(trial))
     }
@@ -59,16 +55,12 @@ impl Experiment {
         let Some(row) = self.rows.get_mut(&trial) else { return not_now("no trial is under review") };
         let TrialRecord { verdict, value, cause, measured, .. } = row.clone();
         row.repeats.push(RepeatRecord { seed, verdict, value, cause, measured });
-        let counted = row.counted_repeats();
-        let done = counted >= wanted;
-        if done {
-            let values: Vec<f64> = row.repeats.iter().filter_map(|repeat| repeat.value).collect();
-            let falls = row.repeats.iter().filter(|repeat| repeat.verdict == Some(Verdict::Fall)).count() as u32;
-            let mean = values.iter().sum::<f64>() / f64::from(counted.max(1));
-            let verdict = if falls == counted { Verdict::Fall } else { Verdict::Accept };
-            (row.verdict, row.suggested, row.value) = (Some(verdict), Some(verdict), Some(mean));
-            row.cause = format!("mean of {counted} repeats, {falls} fell");
-            return Ok(Some(mean));
+        if row.counted_repeats() >= wanted {
+            let judged = row.repeats.iter().filter_map(|repeat| Some((repeat.verdict?, repeat.value)));
+            let counted: Vec<_> = judged.filter(|(verdict, _)| *verdict != Verdict::Void).collect();
+            let (verdict, mean, cause) = objective::judge_repeats(&counted);
+            (row.verdict, row.suggested, row.value, row.cause) = (Some(verdict), Some(verdict), mean, cause);
+            return Ok(mean);
         }
         let repeats = row.repeats.clone();
         (row.verdict, row.suggested, row.value, row.hand_value, row.measured) = (None, None, None, None, None);
@@ -114,14 +106,19 @@ impl Experiment {
 
     /// Gives the trial up between its rollouts: it is void, its rollouts stay on record.
     pub(super) fn give_up(&mut self, trial: u32) -> Result<(), RequestRefusal> {
-        if let Some(row) = self.rows.get_mut(&trial) {
-            row.verdict = Some(Verdict::Void);
-            row.cause = "given up between its repeats".to_owned();
-        }
-        self.write_judgement(trial, false)?;
-        self.study.tell(trial, Outcome::Fail)?;
-        self.publish_row(trial);
+        let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
+        let cause = "given up between its repeats".to_owned();
+        let void = TrialRecord { verdict: Some(Verdict::Void), cause, ..row.clone() };
+        let judged = attributes::write(&JudgedAttributes::of(&void, false));
+        let told = self.study.tell_if(trial, Outcome::Fail, &judged, |_| true)?;
         self.state = ExperimentState::Finished;
+        if told == TellOutcome::AlreadyFinished {
+            self.rows.remove(&trial);
+            self.propose()?;
+            return Err(RequestRefusal::EndedElsewhere(trial));
+        }
+        self.rows.insert(trial, void);
+        self.publish_row(trial);
         Ok(self.propose()?)
     }
 }

@@ -212,9 +212,13 @@ impl Experiment {
     /// Sets the note of a trial.
     /// Refused when there is no such trial.
     pub fn note(&mut self, trial: u32, text: &str) -> Result<(), RequestRefusal> {
-        let Some(row) = self.rows.get_mut(&trial) else { return not_now(format!("there is no trial {trial}")) };
-        row.note = text.to_owned();
+        if !self.rows.contains_key(&trial) {
+            return not_now(format!("there is no trial {trial}"));
+        }
         self.study.note(trial, text)?;
+        if let Some(row) = self.rows.get_mut(&trial) {
+            row.note = text.to_owned();
+        }
         self.publish_row(trial);
         Ok(())
     }

@@ -20,7 +20,7 @@ use crate::control::settings::{ApprovalLimits, ControlSettings};
 use crate::realtime::channel::SessionPorts;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
-use crate::recording::recorder::{CollectedTicks, RecorderWatch, TrialTicks};
+use crate::recording::recorder::{CollectedTicks, RecorderStatus, RecorderWatch, TrialTicks};
 use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::{Approval, ExperimentStage};
 use unattended::Unattended;
@@ -30,6 +30,7 @@ use unfinished::{Asker, JobPurpose, UnfinishedJob};
 const COUNTERS_PERIOD_NS: u64 = 100_000_000;
 
 const RECORDER_GONE: &str = "the recorder's thread has ended";
+const OTHER_FILE: &str = "a file of the recording could not be begun or completed";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
 const GUARD_SILENT: &str = "the guard process does not answer: nothing damps the robot if quadfrog is killed; continue the process if it is stopped (`kill -CONT`), otherwise sit down, quit and start again";
@@ -107,6 +108,8 @@ pub struct Supervisor {
     ended: Option<Ended>,
     unmeasured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
+    /// Error of another file of the recording than the present one.
+    recorder_warning: Option<String>,
     recorder_gone: bool,
     /// Reason for which the guard does not protect the robot; none while it does.
     guard_objection: Option<&'static str>,
@@ -163,6 +166,7 @@ impl Supervisor {
             ended: None,
             unmeasured: VecDeque::new(),
             recorder_error: None,
+            recorder_warning: None,
             recorder_gone: false,
             guard_objection: None,
             observe,
@@ -224,16 +228,6 @@ impl Supervisor {
         }
     }
 
-    /// Logs a warning of the engine.
-    pub fn report_warning(&mut self, message: String, time_ns: u64) {
-        self.log(LogLevel::Warning, message, time_ns);
-    }
-
-    /// Writes a message to the log.
-    pub fn report(&mut self, level: LogLevel, message: String, time_ns: u64) {
-        self.log(level, message, time_ns);
-    }
-
     /// Returns the mode that was reported to the session last.
     pub fn mode(&self) -> Mode {
         self.mode
@@ -263,7 +257,14 @@ impl Supervisor {
         }
         self.release();
         self.measure(time_ns);
-        let error = self.recorder.get().error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
+        let RecorderStatus { error, warning, .. } = self.recorder.get();
+        if warning != self.recorder_warning {
+            if let Some(warning) = &warning {
+                self.log(LogLevel::Error, format!("{OTHER_FILE} ({warning}); the present one goes on"), time_ns);
+            }
+            self.recorder_warning = warning;
+        }
+        let error = error.or_else(|| self.recorder_gone.then(|| RECORDER_GONE.to_owned()));
         if error != self.recorder_error {
             if let Some(error) = &error {
                 self.log(LogLevel::Error, format!("the recording failed: {error}"), time_ns);
@@ -444,7 +445,8 @@ impl Supervisor {
         self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
     }
 
-    fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
+    /// Writes a message to the log.
+    pub fn log(&mut self, level: LogLevel, message: String, time_ns: u64) {
         self.publish(Record::Log(LogRecord { level, source: "session".to_owned(), message }), time_ns);
     }
 }

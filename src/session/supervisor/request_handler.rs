@@ -1,7 +1,7 @@
 //! Execution of the operator's requests.
 
 use super::unfinished::{ApprovalState, Asker, JobPurpose};
-use super::{Supervisor, study_requests};
+use super::{OTHER_FILE, Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::Lowering;
 use crate::session::arming_checklist::refusals;
@@ -89,6 +89,9 @@ impl Supervisor {
         if let Some(error) = &self.recorder_error {
             return Err(format!("nothing is recorded ({error}); a jump without a recording is not measured"));
         }
+        if let Some(warning) = &self.recorder_warning {
+            return Err(format!("{OTHER_FILE} ({warning}); end the session and continue the study in a new one"));
+        }
         if let Some(inhibit) = self.inhibit() {
             return Err(inhibit);
         }
@@ -109,18 +112,19 @@ impl Supervisor {
             Lowering::SitDown => (Trigger::SitDown, Command::SitDown, Mode::SitDown, "the robot sits down"),
             Lowering::Cancel => (Trigger::Cancel, Command::Cancel, Mode::Ready, "the countdown is cancelled"),
         };
-        let between_jumps = lowering == Lowering::SitDown && self.mode == Mode::Jump && self.in_a_row;
-        let text = if between_jumps { "no further jump; the robot lands, then sits down" } else { text };
+        // As in `Cycle::handle_command`.
+        let in_a_row = lowering == Lowering::SitDown && self.in_a_row && matches!(self.mode, Mode::Jump | Mode::Settle);
+        let text = if in_a_row { "no further jump; the robot lands, then sits down" } else { text };
         let answered = &mut self.lowerings_answered[lowering as usize];
         if self.control.lowering.count(lowering) == *answered {
-            return if between_jumps {
+            return if in_a_row {
                 self.command(command).map(|()| text.to_owned())
             } else {
                 self.ask(trigger, command, text)
             };
         }
         *answered += 1;
-        if self.mode != reached && !between_jumps {
+        if self.mode != reached && !in_a_row {
             self.require_allowed(trigger)?;
         }
         Ok(text.to_owned())

@@ -31,8 +31,8 @@ fn judged(judged: Result<(), RequestRefusal>, answer: String) -> JobOutput {
 
 fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<String, RequestRefusal> {
     Ok(match request {
-        OperatorRequest::Skip => {
-            experiment.skip()?;
+        OperatorRequest::Skip { trial, revision } => {
+            experiment.skip(*trial, *revision)?;
             "skipped; a new proposal follows".to_owned()
         }
         OperatorRequest::Override { parameter, value } => {

@@ -182,7 +182,7 @@ impl EmulatedRobot {
         state
     }
 
-    /// Adds the least noise of an inertial unit: one that is alive never repeats a measurement.
+    /// Adds the least noise of an inertial unit: a unit that measures never repeats a measurement.
     fn add_imu_noise(&self, imu: &mut Imu) {
         let sign = if self.time_ms.is_multiple_of(2) { 1.0 } else { -1.0 };
         imu.gyro_body.z += sign * IMU_NOISE;

@@ -10,7 +10,7 @@ use quadfrog::realtime::channel::{SHOWN_EVERY, StopLatch};
 use quadfrog::recording::player::{MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
-use quadfrog::telemetry::{Counters, Phase, Snapshot};
+use quadfrog::telemetry::{Phase, Snapshot};
 
 use super::beside::TrialPair;
 use super::rejudge::rejudge;
@@ -351,7 +351,8 @@ impl ReplayFeed {
             messages.extend(self.recording.cuts().into_iter().map(|cut| logged(0, cut)));
         }
         messages.extend(self.recording.events_before(from_ns).map(Msg::Record));
-        self.snapshot.counters = Counters::default();
+        // No tick may lie in the seconds before the time: the robot of another time is not shown then.
+        self.snapshot = Snapshot::default();
         self.logged.clear();
         self.next.clear();
         // The charts show every fifth tick; the newest one is shown in numbers.

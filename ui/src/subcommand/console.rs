@@ -201,8 +201,8 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         // With an error the recording keeps the name of one that is written.
         RecorderStatus { file, .. } => part_of(file),
     });
-    let failure = recorded.filter(|status| !status.finished || status.error.is_some()).map(|status| {
-        let cause = status.error.unwrap_or_else(|| "the recorder ended early; please report it".to_owned());
+    let failure = recorded.filter(|status| !status.finished || status.incomplete().is_some()).map(|status| {
+        let cause = status.incomplete().unwrap_or("the recorder ended early; please report it");
         Failure::Other(anyhow!("the recording is not complete: {cause}"))
     });
     if exit == ConsoleExit::HungUp || arguments.observe {

@@ -1,4 +1,4 @@
-//! `quadfrog guard`: the process that a console with a robot starts to damp it if the console dies. Standard input is the
+//! `quadfrog guard`: the process that a console with a robot starts to damp it if the console ends. Standard input is the
 //! pipe from the console, standard output the socket of a Go1.
 
 use std::fs::File;

@@ -22,6 +22,7 @@ use crate::legal::may_request;
 use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::model::dialog::Dialog;
+use crate::model::jump_series::JumpSeries;
 use crate::model::session::SessionModel;
 use crate::settings::BellCause;
 use dialog::KeyOutcome;
@@ -79,6 +80,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             // It was about a later time of the recording.
             model.message = None;
             model.history.clear();
+            model.jump_series = JumpSeries::default();
             model.health_history.clear();
             model.log_view.back = 0;
         }

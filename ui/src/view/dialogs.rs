@@ -282,7 +282,7 @@ fn field(
     vec![Line::from(spans), Line::default(), Line::from(below)]
 }
 
-/// What a value by hand stands for, and what the robot has measured.
+/// Meaning of a value by hand, and the value that the robot has measured.
 fn by_hand(model: &Model, trial: u32) -> String {
     let info = &model.session.info;
     let along = match info.task.filter(|task| task.unit() == info.unit) {

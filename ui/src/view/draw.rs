@@ -55,7 +55,7 @@ pub fn with_deviation(theme: &Theme, value: f64, deviation: f64, unit: &str) -> 
     format!("{} {}{} {unit}", number(value), theme.plus_minus(), number(deviation))
 }
 
-/// What the sampler's model expects of a trial: `expected 0.612 ±0.031 m, stands with 93 %`.
+/// Expectation of the sampler's model of a trial: `expected 0.612 ±0.031 m, stands with 93 %`.
 pub fn expectation(theme: &Theme, expected: &ExpectedResult, unit: &str) -> String {
     let value = with_deviation(theme, expected.value, expected.deviation, unit);
     format!("expected {value}, stands with {:.0} %", 100.0 * expected.p_stand)

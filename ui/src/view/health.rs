@@ -229,7 +229,9 @@ fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     rows.extend([
         detail("study", if same { stored } else { beside(&stored, &study_folder) }, false),
         match &model.recorder {
-            Some(RecorderStatus { error: Some(error), .. }) => row("writing", error.clone(), true),
+            Some(status) if status.incomplete().is_some() => {
+                row("writing", status.incomplete().unwrap_or_default().to_owned(), true)
+            }
             Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
             None => row("written", "-".to_owned(), false),
         },

@@ -102,7 +102,7 @@ fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width
     Line::from(spans)
 }
 
-/// What the sampler's model expects of the trial, and its advice to end the search.
+/// Expectation of the sampler's model of the trial, and its advice to end the search.
 fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResult>) -> Vec<Line<'static>> {
     let Some(expected) = expected else { return Vec::new() };
     let role = if expected.p_stand < 0.5 { Role::Warning } else { Role::Quiet };

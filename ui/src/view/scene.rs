@@ -76,7 +76,7 @@ fn floor_z(ground: Option<&Ground>, x: f64, y: f64) -> f64 {
     -(normal.x * x + normal.y * y) / normal.z
 }
 
-/// What the picture shows beside the robot, in its frame.
+/// Parts of the picture beside the robot, in its frame.
 pub struct Scene<'a> {
     pub start: Start,
     ground: Option<&'a Ground>,

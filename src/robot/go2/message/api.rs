@@ -45,8 +45,6 @@ pub mod sport {
     pub const SERVICE: &str = "sport";
     /// Damps every joint.
     pub const DAMP: i64 = 1001;
-    /// Stops a movement.
-    pub const STOP_MOVE: i64 = 1003;
     /// Lies down.
     pub const STAND_DOWN: i64 = 1005;
 

@@ -1,4 +1,4 @@
-//! What a payload must be before its fields are read.
+//! Conditions of a payload before its fields are read.
 
 /// Encapsulation header of a payload: plain CDR, little-endian, no options.
 pub const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];

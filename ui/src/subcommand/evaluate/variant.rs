@@ -1,4 +1,4 @@
-//! What distinguishes the compared runs.
+//! Differences between the compared runs.
 
 /// Settings of the runs that are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -138,7 +138,7 @@ impl Workplace {
             cause: None,
             fall_time_s: None,
             jumps: 0,
-            period_s: (spec.jumps > 1).then(|| 0.5 / jump.f0_hz + 0.5 / jump.f1_hz),
+            period_s: (spec.jumps > 1).then(|| jump.period_s()),
             value: 0.0,
             measured: None,
             tilt_at_impulse_rad: 0.0,

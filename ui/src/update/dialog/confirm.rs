@@ -89,7 +89,10 @@ pub(super) fn take_control_key(model: &mut Model, key: Key) -> Vec<Effect> {
 pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> Vec<Effect> {
     let yes = matches!(key.typed(), Some('y' | 'Y'));
     match question {
-        Question::Skip { .. } if yes => request_if_legal(model, Action::Skip, OperatorRequest::Skip, "not skipped"),
+        Question::Skip { trial, revision } if yes => {
+            let skip = OperatorRequest::Skip { trial: *trial, revision: *revision };
+            request_if_legal(model, Action::Skip, skip, "not skipped")
+        }
         Question::Skip { .. } => cancelled(model, "not skipped"),
         Question::JudgeAnyway { verdict, .. } if yes => {
             let action = if *verdict == Verdict::Fall { Action::Fall } else { Action::Accept };

@@ -52,6 +52,25 @@ pub struct PaperClaim {
     pub short: bool,
 }
 
+type Text = &'static str;
+
+/// Returns the constructor of the claims of an experiment, which takes the other fields in their order.
+pub fn claims_of(
+    experiment: PaperExperiment,
+) -> impl Fn(Text, Text, Text, Text, String, String, ClaimJudgement, bool) -> PaperClaim {
+    move |name, place, sentence, paper, ours, criterion, judgement, short| PaperClaim {
+        experiment,
+        name,
+        place,
+        sentence,
+        paper,
+        ours,
+        criterion,
+        judgement,
+        short,
+    }
+}
+
 impl PaperClaim {
     /// Returns the judgement with its rule.
     pub fn reason(&self) -> String {

@@ -6,7 +6,7 @@ use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::{Task, Verdict};
 
-use super::claim::{ClaimJudgement, PaperClaim, REACHED, mean, robot_value, spread};
+use super::claim::{ClaimJudgement, PaperClaim, REACHED, claims_of, mean, robot_value, spread};
 use crate::subcommand::reproduce::configuration::ExperimentConfiguration::{self, *};
 use crate::subcommand::reproduce::plan::{PAPER_POINT_F0_HZ, PAPER_TRIALS, PaperExperiment, RunPoint, THREE_TASKS};
 use crate::subcommand::reproduce::results::{ReproduceResults, TrialResult};
@@ -42,17 +42,7 @@ pub fn convergence(results: &ReproduceResults) -> Vec<PaperClaim> {
     let final_mean = |task, sampler| mean(of(task, sampler, trials));
     let better =
         THREE_TASKS.iter().all(|&task| final_mean(task, SamplerKind::Tpe) > final_mean(task, SamplerKind::Random));
-    let claim = |name, place, sentence, paper, ours, criterion: String, judgement, short| PaperClaim {
-        experiment: PaperExperiment::Convergence,
-        name,
-        place,
-        sentence,
-        paper,
-        ours,
-        criterion,
-        judgement,
-        short,
-    };
+    let claim = claims_of(PaperExperiment::Convergence);
     vec![
         claim(
             "successful studies, ideal simulation",
@@ -136,17 +126,7 @@ pub fn hardware_like(results: &ReproduceResults) -> Vec<PaperClaim> {
         format!("{} {ideal:.2} against {like:.2} {}", task.name(), task.unit())
     });
     let angle = mean(forward.iter().map(angle_deg));
-    let claim = |name, place, sentence, paper, ours, criterion: String, judgement, short| PaperClaim {
-        experiment: PaperExperiment::HardwareLike,
-        name,
-        place,
-        sentence,
-        paper,
-        ours,
-        criterion,
-        judgement,
-        short,
-    };
+    let claim = claims_of(PaperExperiment::HardwareLike);
     const CONVERGENCE: &str = "III, Optimization Convergence";
     vec![
         claim(

@@ -3,7 +3,7 @@
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::trial::Task;
 
-use super::claim::{ClaimJudgement, PaperClaim, mean, spread};
+use super::claim::{ClaimJudgement, PaperClaim, claims_of, mean, spread};
 use crate::subcommand::reproduce::configuration::ExperimentConfiguration::{self, *};
 use crate::subcommand::reproduce::plan::{F1_HZ, PaperExperiment, RunPoint, THREE_TASKS};
 use crate::subcommand::reproduce::results::{ReproduceResults, RunResult};
@@ -43,17 +43,7 @@ pub fn continuous(results: &ReproduceResults) -> Vec<PaperClaim> {
         lateral.iter().map(|study| study.best(u32::MAX).and_then(|best| best.value).unwrap_or(0.0)).collect();
     let mostly = |runs: &[&RunResult]| !runs.is_empty() && 10 * falls(runs) <= runs.len();
     let all_directions = mostly(&twist) && !lateral.is_empty() && lateral.iter().all(|value| *value > 0.0);
-    let claim = |name, place, sentence, paper, ours, criterion: String, judgement, short| PaperClaim {
-        experiment: PaperExperiment::Continuous,
-        name,
-        place,
-        sentence,
-        paper,
-        ours,
-        criterion,
-        judgement,
-        short,
-    };
+    let claim = claims_of(PaperExperiment::Continuous);
     vec![
         claim(
             "continuous forward jumping",
