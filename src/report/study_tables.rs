@@ -230,7 +230,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
     let columns = columns.chain(known.then(|| Column::text("ticks")));
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
-        let ticks = if study.recorded(row.trial).is_some() { "yes" } else { "no" };
+        let ticks = if study.has_ticks_of(row.trial) { "yes" } else { "no" };
         let mut verdict = row.verdict_name().unwrap_or("not judged").to_owned();
         for (holds, text) in [(row.counts_by_hand(), ", J by hand"), (study.best == Some(row.trial), ", best")] {
             verdict += if holds { text } else { "" };
