@@ -37,6 +37,9 @@ impl LayoutOf {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    override_usage = "quadfrog export [OPTIONS] <FILE>\n       quadfrog export --layout <VIEWER> [--output <OUT>]"
+)]
 pub struct ExportArguments {
     /// A recording: session.mcap, session.mcap.part of a session that runs or was cut off, or the folder of a study for all its
     /// files, one after the other
