@@ -81,7 +81,7 @@ const LIVE: &[Row] = &[
 const REPLAY: &[Row] = &[
     row(Action::PlayPause, "p", Shows("paused"), ("", "")),
     row(Action::NextMarker, "]", Changes, ("", "")),
-    row(Action::PreviousMarker, "[", Changes, ("]]]]", "Trial #2: judge it")),
+    row(Action::PreviousMarker, "[", Changes, (")", "Trial #2: judge it")),
     row(Action::Seek, "G", Shows("Go to a time or a trial"), ("0\r", "00:00.000")),
     row(Action::ReplayEnd, ")", Hides("00:00.000"), ("", "Trial #2: judge it")),
     row(Action::ReplayStart, "(", Shows("00:00.000"), ("", "")),

@@ -532,6 +532,8 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     let marker = played.time_ms();
     assert!(times.contains(&marker) && marker < times[times.len() - 1]);
     (0..20).for_each(|_| played.press("["));
+    assert_eq!((played.time_ms(), played.console.said()), (times[1], "no earlier trial or fault"));
+    played.press("(");
     assert_eq!(played.time_ms(), 0);
     assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.

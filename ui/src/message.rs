@@ -50,6 +50,8 @@ pub enum Msg {
     /// A result of judging the trials of a replay again.
     Rejudged(RejudgeNews),
     /// Two trials of a replay, or of two recordings, to lay over each other.
+    /// An answer of the replay to a key.
+    Answer(String),
     SideBySide(Box<SideBySide>),
     /// The replay jumped to another time; the records up to that time follow from the start.
     Rewound,
@@ -196,12 +198,41 @@ pub struct ReplayStatus {
     /// Time that the parts found so far take that cannot be read, ns.
     pub lost_ns: u64,
 }
+    /// Time from the playhead to the end of the recording at its last growth, ns.
+    pub behind_ns: u64,
 
 /// The whole recording, wherever the playhead is.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReplayTimeline {
     /// Runs of trials, in the order of time.
     pub trials: Vec<TrialRun>,
+/// Age from which what a followed recording shows counts as old, ns: the recording grows every second.
+const OLD_NS: u64 = 2_500_000_000;
+
+impl ReplayStatus {
+    /// Age of what is shown, ns: the playhead's distance to the end, and the time since there was a later one. None for a
+    /// recording that is not followed, and after the end of the session that wrote it.
+    pub fn age_ns(&self) -> Option<u64> {
+        let silent_ns = self.silent_ns.filter(|_| self.observer.is_none_or(|observer| !observer.ended))?;
+        Some(silent_ns.saturating_add(self.behind_ns))
+    }
+
+    /// Whether a followed recording is shown as it is at present.
+    pub fn shows_present(&self) -> bool {
+        self.age_ns().is_some_and(|age_ns| age_ns <= OLD_NS)
+    }
+
+    /// The age of what a followed recording shows if that is old, ns.
+    pub fn old_ns(&self) -> Option<u64> {
+        self.age_ns().filter(|age_ns| *age_ns > OLD_NS)
+    }
+
+    /// Whether a later part of the recording is known than the one that is shown as old.
+    pub fn later_is_known(&self) -> bool {
+        self.old_ns().is_some() && self.behind_ns > OLD_NS
+    }
+}
+
     /// Begins of faults, ns.
     pub faults_ns: Vec<u64>,
     /// Begin and end of the parts found so far that cannot be read, ns.
@@ -213,6 +244,8 @@ pub struct ReplayTimeline {
 }
 
 /// The recording whose trials are laid beside those of the first one.
+    /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.
+    pub begins_utc_ns: Vec<(u64, u64)>,
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SecondRecording {
     /// Its first file.
@@ -250,6 +283,13 @@ impl ReplayTimeline {
     /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
     pub fn has_ticks_of(&self, trial: u32) -> bool {
         self.trials.iter().any(|span| span.trial == trial)
+    }
+
+    /// The UTC time of a time of the replay, ns since 1970; none where the recording does not say when it began.
+    pub fn utc_ns(&self, time_ns: u64) -> Option<u64> {
+        let file = self.begins_utc_ns.partition_point(|(begin_ns, _)| *begin_ns <= time_ns).checked_sub(1)?;
+        let (begin_ns, utc_ns) = self.begins_utc_ns[file];
+        (utc_ns > begin_ns).then(|| utc_ns.saturating_add(time_ns - begin_ns))
     }
 
     /// Whether a trial can be laid beside another: it is in the second recording, or without one in this.

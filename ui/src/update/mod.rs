@@ -80,6 +80,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.message = None;
             model.history.clear();
             model.health_history.clear();
+        Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
+        Msg::Answer(text) => say(model, LogLevel::Info, text),
             model.log_view.back = 0;
         }
         Msg::Resumed => model.session.arming_checks.clear(),

@@ -1,5 +1,6 @@
 //! Applies the session's records to the model: rows, the log, the answer to the operator, the bell.
 
+use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
@@ -11,6 +12,7 @@ use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Question};
 use crate::model::log::LogLine;
+use crate::model::{Model, Notice};
 use crate::model::trials::RunTime;
 use crate::settings::BellCause;
 
@@ -69,9 +71,12 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 Mode::Fault => LogLevel::Error,
                 Mode::Damped => LogLevel::Warning,
                 _ => LogLevel::Info,
+            // The observer who stopped may have been reported before the stop.
+            let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
+            let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
             };
             if stopped {
-                model.session.stopped_because = change.cause.clone();
+                model.session.stopped_because = by_observer.map_or(&change.cause, |message| &message.text).clone();
                 // The STOP key was answered already.
                 if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
@@ -148,6 +153,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         Record::ArmingChecks(list) => {
             model.session.arming_checks = list;
             model.session.arming_checked_ns = time_ns;
+            if line.source == "session" && line.message.starts_with(STOP_BY) {
+                model.message.iter_mut().for_each(|message| message.stop = true);
+                model.session.stopped_because.clone_from(&line.message);
+            }
         }
         Record::Search(search) => model.session.search = Some(search),
         Record::Insight(mut insight) => {

@@ -10,7 +10,8 @@ use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate};
 use crate::action::Action;
-use crate::legal::legal;
+use crate::legal::{legal, may_request, waiting_trial_is_meant};
+use crate::message::ReplayStatus;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Question};
 use crate::theme::Role;
@@ -176,16 +177,29 @@ fn review(model: &Model) -> NextStep {
 
 fn replay(model: &Model) -> NextStep {
     if let Some(observer) = model.observer() {
-        let lead = match observer.ended {
-            true => "The session has ended. STOP does not reach its robot any longer.",
-            false => "Watching, about 1 s behind. STOP reaches the robot of this session at once.",
+        let lead = match (observer.ended, old) {
+            (true, _) => "The session has ended. STOP does not reach its robot any longer.".to_owned(),
+            (false, Some(old)) => format!("{old} STOP reaches its robot at once."),
+            (false, None) => "Watching, about 1 s behind. STOP reaches the robot of this session at once.".to_owned(),
         };
         return step(
             lead,
             model,
-            &[(Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest"), (Action::Quit, "quit")],
+            &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest")],
         );
+/// The age of what a followed recording shows, if it is old, and the key to the present.
+fn behind(model: &Model) -> Option<String> {
+    let replay = model.replay.as_ref()?;
+    let old_s = replay.old_ns()? as f64 / 1e9;
+    let end = model.keymap.key(Action::ReplayEnd);
+    Some(match replay.later_is_known() {
+        true => format!("Behind by {old_s:.0} s: {end} shows the present."),
+        false => format!("Nothing new for {old_s:.0} s."),
+    })
+}
+
     }
+    let old = behind(model);
     let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
     let key = model.keymap.key(Action::PlayPause);
     step(
@@ -199,6 +213,9 @@ fn replay(model: &Model) -> NextStep {
             (Action::NextFall, "next fall"),
             (Action::StepForward, "step"),
             (Action::Slower, "slower"),
+    if let Some(old) = old.filter(|_| model.replay.as_ref().is_some_and(ReplayStatus::later_is_known)) {
+        return step(old, model, &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play")]);
+    }
             (Action::Faster, "faster"),
             (Action::Quit, "quit"),
         ],
