@@ -44,14 +44,19 @@ pub enum Msg {
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     Record(Stamped),
+    /// The jump of a trial of an earlier session, every fifth tick.
+    EarlierJump {
+        trial: u32,
+        ticks: Vec<Tick>,
+    },
     Replay(ReplayStatus),
+    /// An answer of the replay to a key.
+    Answer(String),
     /// The trials, faults and lost parts of the whole recording; again when they change.
     Timeline(Box<ReplayTimeline>),
     /// A result of judging the trials of a replay again.
     Rejudged(RejudgeNews),
     /// Two trials of a replay, or of two recordings, to lay over each other.
-    /// An answer of the replay to a key.
-    Answer(String),
     SideBySide(Box<SideBySide>),
     /// The replay jumped to another time; the records up to that time follow from the start.
     Rewound,
@@ -193,19 +198,14 @@ pub struct ReplayStatus {
     pub present: Option<u32>,
     /// Time since the recording grew, ns, if it is being written and is followed.
     pub silent_ns: Option<u64>,
+    /// Time from the playhead to the end of the recording at its last growth, ns.
+    pub behind_ns: u64,
     /// The session that writes it, if its STOP can be reached.
     pub observer: Option<ObserverStatus>,
     /// Time that the parts found so far take that cannot be read, ns.
     pub lost_ns: u64,
 }
-    /// Time from the playhead to the end of the recording at its last growth, ns.
-    pub behind_ns: u64,
 
-/// The whole recording, wherever the playhead is.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct ReplayTimeline {
-    /// Runs of trials, in the order of time.
-    pub trials: Vec<TrialRun>,
 /// Age from which what a followed recording shows counts as old, ns: the recording grows every second.
 const OLD_NS: u64 = 2_500_000_000;
 
@@ -233,19 +233,24 @@ impl ReplayStatus {
     }
 }
 
+/// The whole recording, wherever the playhead is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReplayTimeline {
+    /// Runs of trials, in the order of time.
+    pub trials: Vec<TrialRun>,
     /// Begins of faults, ns.
     pub faults_ns: Vec<u64>,
     /// Begin and end of the parts found so far that cannot be read, ns.
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.
+    pub begins_utc_ns: Vec<(u64, u64)>,
     /// The second recording; none without one.
     pub second: Option<SecondRecording>,
 }
 
 /// The recording whose trials are laid beside those of the first one.
-    /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.
-    pub begins_utc_ns: Vec<(u64, u64)>,
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SecondRecording {
     /// Its first file.
@@ -280,16 +285,16 @@ pub struct ComparedTrial {
 }
 
 impl ReplayTimeline {
-    /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
-    pub fn has_ticks_of(&self, trial: u32) -> bool {
-        self.trials.iter().any(|span| span.trial == trial)
-    }
-
     /// The UTC time of a time of the replay, ns since 1970; none where the recording does not say when it began.
     pub fn utc_ns(&self, time_ns: u64) -> Option<u64> {
         let file = self.begins_utc_ns.partition_point(|(begin_ns, _)| *begin_ns <= time_ns).checked_sub(1)?;
         let (begin_ns, utc_ns) = self.begins_utc_ns[file];
         (utc_ns > begin_ns).then(|| utc_ns.saturating_add(time_ns - begin_ns))
+    }
+
+    /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
+    pub fn has_ticks_of(&self, trial: u32) -> bool {
+        self.trials.iter().any(|span| span.trial == trial)
     }
 
     /// Whether a trial can be laid beside another: it is in the second recording, or without one in this.
