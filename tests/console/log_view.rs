@@ -91,11 +91,12 @@ fn a_line_longer_than_the_screen_scrolls_to_its_end() {
 }
 
 #[test]
-fn enter_in_the_log_still_acknowledges_a_stop_first() {
+fn enter_in_the_log_opens_its_line_and_acknowledges_no_stop() {
     let mut console = logged(&["a line"]);
     console.mode(Mode::Damped);
-    assert_eq!(console.requests(&["Enter"]).len(), 1);
-    assert!(console.model.dialog.is_none());
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_shows(&console.next_step(), &["STOPPED: Esc, then k acknowledges."]);
+    assert_eq!(console.requests(&["Esc", "k"]).len(), 1);
 }
 
 #[test]

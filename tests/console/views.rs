@@ -576,6 +576,10 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
         played.press("]");
         times.push(played.time_ms());
     }
+    // After the last marker it stays there; another key goes to the end.
+    assert_eq!(played.console.said(), "no further trial or fault");
+    played.press(")");
+    times.push(played.time_ms());
     times.dedup();
     assert!(times.len() == 4 && times.is_sorted(), "{times:?}");
     assert_eq!(played.console.model.session.trials.records.len(), 3, "all trials at the end");
@@ -588,7 +592,7 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     assert_eq!(played.time_ms(), 0);
     assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.
-    (0..20).for_each(|_| played.press("]"));
+    played.press(")");
     played.press("p");
     played.wait(500);
     assert_eq!(played.time_ms(), 500);

@@ -246,7 +246,7 @@ fn may_clear_overrides(model: &Model) -> Legality {
 }
 
 /// While a trial waits for its verdict, no other row of Trials may be the selected one: a verdict could be meant for that.
-fn waiting_trial_is_meant(model: &Model) -> Legality {
+pub fn waiting_trial_is_meant(model: &Model) -> Legality {
     let waiting = model.session.under_review().map(|row| row.trial);
     let selected = model.selected_trial().map(|row| row.trial).filter(|_| model.view == View::Trials);
     match (waiting, selected) {

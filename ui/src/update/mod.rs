@@ -32,6 +32,15 @@ pub use request::say;
 
 /// Folds one message into the model.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    let was_open = model.dialog.is_some();
+    let effects = fold(model, msg);
+    if model.dialog.is_some() && !was_open {
+        model.dialog_opened_at = model.clock;
+    }
+    effects
+}
+
+fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) => return press(model, key),
         Msg::Mouse(event) => return mouse::handle(model, event),
@@ -71,6 +80,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             beside::follow(model, &status);
             model.replay = Some(status);
         }
+        Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
+        Msg::Answer(text) => say(model, LogLevel::Info, text),
         Msg::Rejudged(news) => rejudged::apply(model, news),
         Msg::SideBySide(both) => beside::show(model, &both),
         Msg::Timeline(timeline) => model.timeline = Some(timeline),
@@ -80,8 +91,6 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.message = None;
             model.history.clear();
             model.health_history.clear();
-        Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
-        Msg::Answer(text) => say(model, LogLevel::Info, text),
             model.log_view.back = 0;
         }
         Msg::Resumed => model.session.arming_checks.clear(),

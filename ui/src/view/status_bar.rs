@@ -269,7 +269,7 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// Draws the newest answer to the operator; one with more rows than the area ends with the mark of a cut.
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
-    let Some(message) = &model.message else { return };
+    let Some(message) = model.shown_message() else { return };
     let role = match message.level {
         LogLevel::Info | LogLevel::Warning if message.is_old(model.clock) => Role::Quiet,
         LogLevel::Info => Role::Text,
