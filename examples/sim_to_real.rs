@@ -5,7 +5,8 @@
 //! `trials`, `seed`, `jobs`. Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
-//! noise, falls as 0.
+//! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`optimum`]): the largest of many noisy values would be
+//! too high.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,8 +36,12 @@ use quadfrog::trial::{JumpParameters, ParameterValues, Task};
 const REPEATS: u64 = 4;
 /// Numbers of jumps after which a study is judged.
 const AFTER: [usize; 5] = [1, 3, 5, 10, 20];
-/// Trials of the study whose best is taken for the optimum.
+/// Trials of the long study of each robot, whose best is one of the points of which the optimum is chosen.
 const LONG: usize = 100;
+/// Points of which the optimum is chosen.
+const SHORTLIST: usize = 10;
+/// Repetitions by which it is chosen, and as many others by which it is valued.
+const OPTIMUM_REPEATS: u64 = 16;
 /// Share of the optimum that counts as reached.
 const REACHED: f64 = 0.95;
 
@@ -99,11 +104,12 @@ struct Job {
     study: u32,
 }
 
-/// Repeated best values and falls so far after [`AFTER`] jumps.
-#[derive(Debug, Clone, Copy)]
+/// Repeated best values and falls so far after [`AFTER`] jumps, and the best point in the end.
+#[derive(Debug, Clone)]
 struct StudyResult {
     best: [f64; AFTER.len()],
     falls: [f64; AFTER.len()],
+    point: Vec<(String, f64)>,
 }
 
 /// Jumps of one robot, with noise of its own for each.
@@ -127,9 +133,9 @@ impl<'a> Jumper<'a> {
         run.stood().then_some(run.value)
     }
 
-    /// Mean of [`REPEATS`] jumps at a point, falls as 0.
-    fn repeated(&mut self, point: &[(String, f64)], seed: u64) -> f64 {
-        (0..REPEATS).map(|i| self.jump(point, seed + i).unwrap_or(0.0)).sum::<f64>() / REPEATS as f64
+    /// Mean of `count` jumps at a point, falls as 0.
+    fn repeated(&mut self, point: &[(String, f64)], seed: u64, count: u64) -> f64 {
+        (0..count).map(|i| self.jump(point, seed + i).unwrap_or(0.0)).sum::<f64>() / count as f64
     }
 }
 
@@ -177,7 +183,7 @@ fn run(task: &KnownTask, targets: &[Target], trials: usize, seed: u64, job: &Job
     let mut jumper = Jumper::new(task, target.properties.apply(&task.plan.robot, &task.plan.simulator));
     let proposer = job.proposer.unwrap_or(Proposer::Gp);
     let mut study = new_study(task, proposer, job.study);
-    let mut result = StudyResult { best: [0.0; AFTER.len()], falls: [0.0; AFTER.len()] };
+    let mut result = StudyResult { best: [0.0; AFTER.len()], falls: [0.0; AFTER.len()], point: Vec::new() };
     // The same noise for all proposers.
     let noise = seed * 1_000_000 + u64::from(job.study) * 10_000 + job.target as u64 * 100_000_000;
     let (mut falls, mut known): (f64, BTreeMap<u32, f64>) = (0.0, BTreeMap::new());
@@ -187,14 +193,28 @@ fn run(task: &KnownTask, targets: &[Target], trials: usize, seed: u64, job: &Job
         let last = job.proposer.is_none() && trial == trials;
         let after = AFTER.iter().position(|after| *after == trial).filter(|_| job.proposer.is_some());
         let Some(index) = after.or(last.then_some(AFTER.len() - 1)) else { continue };
-        let best = best_of(&study).map(|number| {
-            let repeated = || jumper.repeated(&study.trials()[number as usize].parameters, noise + 1_000);
-            *known.entry(number).or_insert_with(repeated)
-        });
-        result.best[index] = best.unwrap_or(0.0);
-        result.falls[index] = falls;
+        if let Some(number) = best_of(&study) {
+            result.point.clone_from(&study.trials()[number as usize].parameters);
+            let repeated = || jumper.repeated(&result.point, noise + 1_000, REPEATS);
+            result.best[index..].fill(*known.entry(number).or_insert_with(repeated));
+        }
+        result.falls[index..].fill(falls);
     }
     result
+}
+
+/// The optimum of a robot, as far as it is known. The best points of the [`SHORTLIST`] studies of the largest values are repeated with
+/// new noise; the largest mean chooses one, and repeats with again other noise are its value.
+fn optimum(task: &KnownTask, target: &Target, seed: u64, results: &[&StudyResult]) -> f64 {
+    let mut jumper = Jumper::new(task, target.properties.apply(&task.plan.robot, &task.plan.simulator));
+    let mut ranked: Vec<&StudyResult> = results.iter().copied().filter(|result| !result.point.is_empty()).collect();
+    let value = |result: &StudyResult| result.best[AFTER.len() - 1];
+    ranked.sort_by(|a, b| value(b).total_cmp(&value(a)));
+    ranked.truncate(SHORTLIST);
+    let noise = (seed + 1) * 1_000_000_000_000;
+    let valued = ranked.iter().map(|result| (jumper.repeated(&result.point, noise, OPTIMUM_REPEATS), &result.point));
+    let chosen = valued.max_by(|a, b| a.0.total_cmp(&b.0));
+    chosen.map_or(0.0, |(_, point)| jumper.repeated(point, noise + OPTIMUM_REPEATS, OPTIMUM_REPEATS))
 }
 
 /// The robots: `count` - 3 from the ranges of the ensemble, the others outside of them.
@@ -323,15 +343,14 @@ fn main() {
         let results = in_parallel(jobs, &work, || Ok(()), run).expect("cannot fail");
         let of = |target: usize, proposer: Option<Proposer>| -> Vec<StudyResult> {
             let chosen = work.iter().zip(&results).filter(|(job, _)| job.target == target && job.proposer == proposer);
-            chosen.map(|(_, result)| *result).collect()
+            chosen.map(|(_, result)| result.clone()).collect()
         };
-        // The best that is known of each robot.
-        let optimum: Vec<f64> = (0..robots)
-            .map(|target| {
-                let all = work.iter().zip(&results).filter(|(job, _)| job.target == target);
-                all.flat_map(|(_, result)| result.best).fold(0.0, f64::max)
-            })
-            .collect();
+        let optimum_of = |_: &mut (), index: &usize| {
+            let all = work.iter().zip(&results).filter(|(job, _)| job.target == *index).map(|(_, result)| result);
+            Ok::<_, ()>(optimum(&task, &targets[*index], seed as u64, &all.collect::<Vec<_>>()))
+        };
+        let indices: Vec<usize> = (0..robots).collect();
+        let optimum = in_parallel(jobs, &indices, || Ok(()), optimum_of).expect("cannot fail");
         for &proposer in &proposers {
             let all: Vec<(usize, StudyResult)> =
                 (0..robots).flat_map(|t| of(t, Some(proposer)).into_iter().map(move |result| (t, result))).collect();

@@ -17,6 +17,13 @@ fn refuses(name: &str, text: &str, words: &[&str]) {
     }
 }
 
+/// Regression: bounds with a text in them "must be a list, not a list".
+#[test]
+fn a_list_with_wrong_entries_names_the_entries_that_it_needs() {
+    let bounds = "[bounds]\nf0 = [\"a\", 1.0]\n";
+    refuses("optimize.toml", bounds, &["optimize.toml:2", "`bounds.f0` must be a list of two numbers, not"]);
+}
+
 #[test]
 fn the_defaults_are_fit_for_use() {
     for name in RobotDescription::embedded_names() {

@@ -1,4 +1,4 @@
-//! What is made from `proto/frog.proto` is kept in the repository, so that a build of the program needs no protobuf compiler.
+//! Files made from `proto/frog.proto` are kept in the repository, so that a build of the program needs no protobuf compiler.
 
 #[path = "support/generate_messages.rs"]
 mod generate_messages;

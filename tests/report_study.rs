@@ -92,6 +92,7 @@ fn study(seed: u32, rows: Vec<TrialRecord>) -> ReportedStudy {
         f1_hz: 0.0,
         parameters: vec![info("f0", "Hz", 0.75, 1.75), info("Fx", "N", 0.0, 150.0), info("Fz", "N", 150.0, 350.0)],
         best: Some(1),
+        confirmation: None,
         model_best: None,
         limits: None,
         recordings: Recordings::default(),
@@ -154,4 +155,10 @@ fn a_page_of_a_study_names_missing_ticks_and_draws_the_others() {
     let motion = page.figures().find(|figure| figure.name == "forward-motion").unwrap();
     assert_eq!(motion.panels.len(), 6);
     assert!(motion.panels.iter().all(|panel| panel.series.len() == 1 && panel.series[0].label == "best, trial 1"));
+    // Regression: a trial that ended in its countdown has ticks for `quadfrog export` and had none here.
+    study.recordings.with_ticks.extend([0, 1]);
+    let page = study_page::page(std::slice::from_ref(&study), &choices, "0.1.0 (test)");
+    let shown = text::render(&page, 80).replace('\n', " ");
+    assert!(shown.contains("Ticks of 2 of 6 trials are recorded"), "{shown}");
+    assert!(shown.contains("Trial 0 ended before the impulse"), "{shown}");
 }

@@ -67,6 +67,7 @@ fn a_jump_of_the_robot_waits_for_a_person_in_a_session_of_the_simulator() {
     let mut measured = open(&options(folder.path(), Backend::Hardware)).unwrap();
     run(&mut measured, TrialEnd::Settled);
     assert_eq!(measured.verdict_without_person(), Some(Verdict::Accept), "on the robot itself");
+    measured.keep_measurement().unwrap();
     drop(measured);
     let simulated = Options { accept_backend_change: true, ..options(folder.path(), Backend::Simulator) };
     let mut experiment = open(&simulated).unwrap();

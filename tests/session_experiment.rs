@@ -351,6 +351,27 @@ fn the_budget_ends_the_study_and_can_be_raised() {
     assert_eq!(experiment.stage(), ExperimentStage::Proposed);
 }
 
+/// Regression: five more trials of a study with more counted trials than its budget gave none.
+#[test]
+fn more_trials_are_more_than_those_that_count_already() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    for _ in 0..4 {
+        accept(&mut experiment);
+    }
+    experiment.close().unwrap();
+    drop(experiment);
+    // As with --resume and --trials 2.
+    let mut experiment = Experiment::open(plan(2), study_in(folder.path())).unwrap();
+    assert_eq!((experiment.stage(), experiment.counted()), (ExperimentStage::Finished, 4));
+    experiment.extend(3).unwrap();
+    assert_eq!((experiment.stage(), experiment.budget()), (ExperimentStage::Proposed, 7));
+    for _ in 0..3 {
+        accept(&mut experiment);
+    }
+    assert_eq!((experiment.stage(), experiment.counted()), (ExperimentStage::Finished, 7));
+}
+
 #[test]
 fn falls_nearby_are_shown_as_a_risk() {
     let mut experiment = experiment(5);

@@ -102,7 +102,7 @@ impl Overlay<'_> {
                             file: self.file.to_owned(),
                             line,
                             key,
-                            expected: kind(known).to_owned(),
+                            expected: expected(known),
                             found: format!("{} {given}", kind(&given)),
                         });
                     }
@@ -159,6 +159,24 @@ fn same_kind(given: &Value, known: &Value) -> bool {
             None => true,
         },
         (given, known) => given.same_type(known),
+    }
+}
+
+/// Returns the kind that a value must have, with the number and the kind of the entries of a list.
+fn expected(known: &Value) -> String {
+    let of = |first: &Value| match first {
+        Value::Integer(_) => Some("whole numbers"),
+        Value::Float(_) => Some("numbers"),
+        Value::String(_) => Some("texts in quotes"),
+        _ => None,
+    };
+    match known {
+        Value::Array(list) => match (list.len(), list.first().and_then(of)) {
+            (2, Some("numbers")) => "a list of two numbers".to_owned(),
+            (_, Some(entries)) => format!("a list of {entries}"),
+            (_, None) => kind(known).to_owned(),
+        },
+        known => kind(known).to_owned(),
     }
 }
 

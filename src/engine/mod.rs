@@ -21,7 +21,8 @@ pub use folder::{
 pub use ground::TrialGround;
 pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
 pub use observers::{
-    FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, find_sessions,
+    FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, STOP_BY, SessionFacts, SessionNews,
+    find_sessions,
 };
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};

@@ -9,6 +9,8 @@ use std::path::PathBuf;
 pub enum RecordingError {
     #[error("{}: could not {doing}: {source}", path.display())]
     Io { path: PathBuf, doing: &'static str, source: io::Error },
+    #[error("{}: there is no such file or folder; name a recording (session.mcap) or a study's folder", path.display())]
+    Missing { path: PathBuf },
     #[error("{}: exists already and is not overwritten; move it away or choose another name", path.display())]
     Exists { path: PathBuf },
     #[error("{}: a recording's name must end in .mcap", path.display())]

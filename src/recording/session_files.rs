@@ -42,10 +42,13 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
 /// Returns the files that a path names: itself, the recordings of a folder, or those of the newest study in it.
 ///
 /// # Errors
-/// When a folder and the folders in it have no recording.
+/// When there is no such path, or a folder and the folders in it have no recording.
 pub fn recordings_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if !path.is_dir() {
-        return Ok(vec![path.into()]);
+        return match path.try_exists() {
+            Ok(false) => Err(RecordingError::Missing { path: path.into() }),
+            _ => Ok(vec![path.into()]),
+        };
     }
     let own = recordings_in(path);
     if !own.is_empty() {

@@ -224,6 +224,15 @@ impl Timeline {
         self.parts.iter().map(|part| part.player.path().into()).collect()
     }
 
+    /// Returns the begin of each file, ns, with its UTC time, ns since 1970; in the order of time.
+    pub fn begins_utc_ns(&self) -> Vec<(u64, u64)> {
+        let utc_ns = |part: &Part| {
+            let in_session_ns = part.begin_ns.saturating_add_signed(-part.shift_ns);
+            part.player.start_utc_ns().saturating_add(in_session_ns)
+        };
+        self.parts.iter().map(|part| (part.begin_ns, utc_ns(part))).collect()
+    }
+
     /// Returns the facts of the first session.
     pub fn session(&self) -> &SessionInfo {
         self.parts[0].player.session()

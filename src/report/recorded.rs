@@ -31,8 +31,10 @@ impl RecordedTrial {
 /// Recorded trials by number, with everything about the recordings that a reader needs to know.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recordings {
-    /// Trials with ticks.
+    /// Trials whose ticks reach the impulse.
     pub trials: BTreeMap<u32, RecordedTrial>,
+    /// Trials of which ticks are recorded, also those that ended before the impulse.
+    pub with_ticks: BTreeSet<u32>,
     /// Recordings that were read.
     pub files: Vec<PathBuf>,
     /// Versions of quadfrog that wrote them, each with its commit.
@@ -57,6 +59,7 @@ impl Recordings {
 
     fn play(&mut self, mut player: Player, robot: &RobotDescription) {
         self.programs.insert(player.session().program_version());
+        self.with_ticks.extend(player.trials_with_ticks());
         let mut ticks: Vec<Tick> = Vec::new();
         for played in player.by_ref() {
             let Played::Tick(tick) = played else { continue };

@@ -5,9 +5,7 @@ use super::jump::force_angle_rad;
 use super::recorded::{RecordedTrial, Recordings};
 use crate::optimize::ask::Direction;
 use crate::robot::description::RobotDescription;
-use crate::trial::{
-    ExpectedResult, JumpParameters, ParameterInfo, PredictedTrial, ProposalSource, Task, TrialRecord, Verdict,
-};
+use crate::trial::{ExpectedResult, JumpParameters, ParameterInfo, PredictedTrial, Task, TrialRecord, Verdict};
 
 /// A study with everything that its report shows.
 #[derive(Debug, Clone)]
@@ -36,6 +34,8 @@ pub struct ReportedStudy {
     pub rows: Vec<TrialRecord>,
     /// Number of the best trial.
     pub best: Option<u32>,
+    /// Result of the newest confirmation of the best, a sentence without its end; none without one.
+    pub confirmation: Option<String>,
     /// The best trial by the sampler's model; none without one.
     pub model_best: Option<PredictedTrial>,
     /// Largest torque of hip, thigh and calf, N m, and their no-load speeds, rad/s; none for an unknown robot.
@@ -64,7 +64,12 @@ impl ReportedStudy {
         self.row(self.best?)
     }
 
-    /// A trial's ticks, if they were recorded.
+    /// Whether ticks of a trial are recorded; those of one that ended before the impulse hold no jump.
+    pub fn has_ticks_of(&self, trial: u32) -> bool {
+        self.recorded(trial).is_some() || self.recordings.with_ticks.contains(&trial)
+    }
+
+    /// A trial's jump, if its ticks were recorded.
     pub fn recorded(&self, trial: u32) -> Option<&RecordedTrial> {
         self.recordings.trials.get(&trial)
     }
@@ -74,10 +79,9 @@ impl ReportedStudy {
         self.rows.iter().filter(move |row| row.verdict == Some(verdict))
     }
 
-    /// Trials that count: accepted or fallen, without repeats that confirm the best.
+    /// Trials that count.
     pub fn counted(&self) -> impl Iterator<Item = &TrialRecord> {
-        let counts = |row: &&TrialRecord| matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall));
-        self.rows.iter().filter(counts).filter(|row| row.source != ProposalSource::Confirm)
+        self.rows.iter().filter(|row| row.counts())
     }
 
     /// Trials of which the sampler's model expected something before they ran.

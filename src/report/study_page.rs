@@ -90,6 +90,11 @@ fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section
         } else {
             section.blocks.push(Block::Table(best));
         }
+        for study in group {
+            if let Some(confirmation) = &study.confirmation {
+                section.paragraph(format!("Confirmation of the best of {}: {confirmation}.", title(study)));
+            }
+        }
         section.blocks.extend(tables::expectations(group).map(Block::Table));
         section.blocks.extend(TaskStudies::new(group).expectations().map(Block::Figure));
     }
@@ -131,10 +136,17 @@ fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
 
 /// Returns which of the drawn trials have ticks, and the remedy where some are missing.
 fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
-    let missing: Vec<String> =
-        trials.iter().filter(|trial| trial.curves.is_none()).map(|trial| trial.row.trial.to_string()).collect();
-    let recorded = study.recordings.trials.len();
-    match (study.recordings.files.is_empty(), missing.len()) {
+    let without_curves = trials.iter().filter(|trial| trial.curves.is_none()).map(|trial| trial.row.trial);
+    let (without_jump, missing): (Vec<u32>, Vec<u32>) = without_curves.partition(|trial| study.has_ticks_of(*trial));
+    let [without_jump, missing] = [without_jump, missing]
+        .map(|trials| trials.iter().map(u32::to_string).collect::<Vec<_>>())
+        .map(|trials| trials.join(", "));
+    let recorded = study.rows.iter().filter(|row| study.has_ticks_of(row.trial)).count();
+    let end = match without_jump.as_str() {
+        "" => String::new(),
+        trials => format!(" Trial {trials} ended before the impulse: there is no jump to draw."),
+    };
+    let text = match (study.recordings.files.is_empty(), missing.len()) {
         (true, _) => "No recording of this study exists: motion, torque and power cannot be drawn. `quadfrog optimize \
                       --record all` and the console record ticks."
             .to_owned(),
@@ -143,9 +155,10 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
             "Ticks of {recorded} of {} trials are recorded; those of trial {} are missing: its motion, torque and power \
              cannot be drawn. `quadfrog optimize --record all` and the console record the ticks of every trial.",
             study.rows.len(),
-            missing.join(", ")
+            missing
         ),
-    }
+    };
+    text + &end
 }
 
 fn verdicts(studies: &[ReportedStudy]) -> Section {

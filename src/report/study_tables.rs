@@ -64,8 +64,9 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
     for group in groups {
         let curves: Vec<Vec<f64>> = group.iter().map(|study| study.best_so_far()).collect();
         let cell = |count: &usize| {
-            let values: Option<Vec<f64>> =
-                curves.iter().map(|curve| curve.get(count - 1).copied().filter(|value| value.is_finite())).collect();
+            // Before the first counted trial there is no value.
+            let at = |curve: &Vec<f64>| curve.get(count.checked_sub(1)?).copied().filter(|value| value.is_finite());
+            let values: Option<Vec<f64>> = curves.iter().map(at).collect();
             values.filter(|values| !values.is_empty()).map_or(Cell::Missing, |values| {
                 let (mean, deviation) = mean_and_deviation(&values);
                 let spread = if values.len() > 1 { format!(" +- {deviation:.3}") } else { String::new() };
@@ -230,7 +231,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
     let columns = columns.chain(known.then(|| Column::text("ticks")));
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
-        let ticks = if study.recorded(row.trial).is_some() { "yes" } else { "no" };
+        let ticks = if study.has_ticks_of(row.trial) { "yes" } else { "no" };
         let mut verdict = row.verdict_name().unwrap_or("not judged").to_owned();
         for (holds, text) in [(row.counts_by_hand(), ", J by hand"), (study.best == Some(row.trial), ", best")] {
             verdict += if holds { text } else { "" };

@@ -119,6 +119,11 @@ pub enum OperatorRequest {
     TakeControl,
 }
 
+/// Returns a number of things in words, `1 trial` or `5 trials`.
+pub fn counted(number: u32, thing: &str) -> String {
+    if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
+}
+
 impl fmt::Display for OperatorRequest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -135,14 +140,16 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::OverrideGain { gain, value } => write!(f, "set the gain {gain} = {}", six_digits(*value)),
             OperatorRequest::ClearOverrides => f.write_str("clear the overrides"),
             OperatorRequest::Fix { parameter, value, trials } => {
-                write!(f, "fix {parameter} = {} for {trials} trials", six_digits(*value))
+                write!(f, "fix {parameter} = {} for {}", six_digits(*value), counted(*trials, "trial"))
             }
             OperatorRequest::Unfix { parameter } => write!(f, "search {parameter} again"),
             OperatorRequest::NarrowBounds { parameter, low, high } => {
                 write!(f, "search {parameter} from {} to {}", six_digits(*low), six_digits(*high))
             }
             OperatorRequest::ConfirmBest { repeats: 0 } => f.write_str("end the repeats"),
-            OperatorRequest::ConfirmBest { repeats } => write!(f, "confirm the best with {repeats} repeats"),
+            OperatorRequest::ConfirmBest { repeats } => {
+                write!(f, "confirm the best with {}", counted(*repeats, "repeat"))
+            }
             OperatorRequest::Judge(verdict) => f.write_str(verdict.name()),
             OperatorRequest::Rerun { trial: None } => f.write_str("re-run"),
             OperatorRequest::Rerun { trial: Some(trial) } => write!(f, "re-run trial {trial}"),
@@ -158,7 +165,7 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::RemoveQueued { trial } => write!(f, "remove trial {trial} from the queue"),
             OperatorRequest::MoveQueued { trial, earlier: true } => write!(f, "run queued trial {trial} earlier"),
             OperatorRequest::MoveQueued { trial, earlier: false } => write!(f, "run queued trial {trial} later"),
-            OperatorRequest::Continue(trials) => write!(f, "continue for {trials} trials"),
+            OperatorRequest::Continue(trials) => write!(f, "continue for {}", counted(*trials, "trial")),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
             OperatorRequest::ChangeVerdict { trial, verdict, reason } => {

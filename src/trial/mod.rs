@@ -456,6 +456,11 @@ pub struct TrialRecord {
 }
 
 impl TrialRecord {
+    /// Returns whether it counts for the budget: accepted or fallen. Repeats that confirm the best are beyond the budget.
+    pub fn counts(&self) -> bool {
+        matches!(self.verdict, Some(Verdict::Accept | Verdict::Fall)) && self.source != ProposalSource::Confirm
+    }
+
     /// Returns the name of its verdict on screens and in reports; a trial of another program was not judged: it is complete
     /// or has failed. None while it runs or waits.
     pub fn verdict_name(&self) -> Option<&'static str> {

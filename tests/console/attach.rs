@@ -92,8 +92,13 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     watcher.wait_for(&["this console only watches"]);
     watcher.send(" ");
     session.wait_for(&["DAMPED"]);
+    // The operator's line says who stopped; one press is one line of the log.
+    session.wait_for(&["k acknowledges: STOP by Grace"]);
     session.send("6");
-    session.wait_for(&["STOP by Grace, who watches this session"]);
+    session.wait_for(&["W session   STOP by Grace, who watches this session"]);
+    std::thread::sleep(Duration::from_millis(300));
+    let lines = session.screen().matches("W session   STOP by Grace").count();
+    assert_eq!(lines, 1, "{}", session.screen());
     watcher.wait_for(&["DAMPED"]);
     assert!(!watcher.screen().contains("NOT CONFIRMED"), "{}", watcher.screen());
     watcher.send("q");
@@ -132,6 +137,25 @@ fn a_stopped_session_looks_old_and_its_stop_unconfirmed() {
     watcher.wait_for(&["STOP NOT CONFIRMED"]);
     session.signal(Signal::SIGCONT);
     watcher.wait_until("it is confirmed", || !watcher.screen().contains("NOT CONFIRMED"));
+    watcher.send("q");
+    watcher.wait();
+    session.quit();
+}
+
+/// Regression: after a pause the observer stayed behind by its length and read FOLLOWING and "about 1 s behind".
+#[test]
+fn a_pause_of_an_observer_looks_old_and_ends_at_the_present() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let mut watcher = lab.open(&["attach"]);
+    watcher.wait_for(&["FOLLOWING", "about 1 s behind"]);
+    watcher.send("p");
+    watcher.wait_for(&["OLD: ", "s behind", ") shows the present"]);
+    assert!(!watcher.screen().contains("FOLLOWING"), "{}", watcher.screen());
+    watcher.send("p");
+    watcher.wait_for(&["FOLLOWING", "about 1 s behind"]);
+    session.send("A");
+    watcher.wait_for(&["READY"]);
     watcher.send("q");
     watcher.wait();
     session.quit();

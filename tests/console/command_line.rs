@@ -254,3 +254,16 @@ fn a_simulated_study_is_not_continued_on_the_robot_without_the_flag() {
     let accepted = program.refused(&["--robot", "go1", "--resume", study, "--accept-backend-change"]);
     assert_shows(&accepted, &["terminal"]);
 }
+
+/// Regressions: the usage of `export` had its file as optional, and a wrong path ended with an error of the system.
+#[test]
+fn a_missing_file_is_named_in_words_and_the_usage_says_what_is_required() {
+    let program = Program::new();
+    assert_shows(&program.text(&["export", "--help"]), &["quadfrog export [OPTIONS] <FILE>", "--layout <VIEWER>"]);
+    for command in [&["replay", "nowhere/session.mcap"][..], &["replay", "--check", "nowhere"], &["export", "nowhere"]]
+    {
+        let message = program.refused(command);
+        assert_shows(&message, &["nowhere", "there is no such file or folder; name a recording"]);
+        assert!(!message.contains("os error"), "{message}");
+    }
+}

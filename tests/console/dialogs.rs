@@ -3,10 +3,11 @@
 mod support;
 
 use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
-use quadfrog::trial::{Backend, Verdict};
+use quadfrog::trial::{Backend, ProposalSource, QueuedPoint, SearchStatus, Verdict};
 use quadfrog_console::action::ACTIONS;
-use quadfrog_console::message::{Effect, ExportedRows};
+use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
 use support::{Console, assert_shows, line_with, session, trial};
@@ -41,7 +42,7 @@ fn words_of_the_dialog(screen: &str) -> String {
 fn every_arming_check_can_be_read_whole_at_every_size() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         let mut console = long_checks();
-        console.update(quadfrog_console::message::Msg::Resize(columns, rows));
+        console.update(Msg::Resize(columns, rows));
         console.press(&["6", "P"]);
         let mut read = String::new();
         for _ in 0..40 {
@@ -243,4 +244,60 @@ fn what_the_operator_has_to_do_is_on_the_first_page() {
     console.press(&["P"]);
     let line = line_with(&console.screen(80, 24), "STOP tested");
     assert_shows(&line, &["you  STOP tested", "found (needed: something)"]);
+}
+
+/// Regressions: an empty box, a list without its length, an old answer below a dialog, a footer without the paging keys.
+#[test]
+fn lists_say_how_long_they_are_and_that_nothing_matches() {
+    let mut console = Console::ready();
+    console.press(&[":"]);
+    console.enter("xylophone");
+    assert_shows(&console.screen(80, 24), &["no action matches"]);
+    console.press(&["Esc", "T"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["Series of the charts (1-", "Up Down)"]);
+    console.press(&["End"]);
+    assert!(!console.screen(80, 24).contains("(1-"), "{}", console.screen(80, 24));
+    console.press(&["Esc", "?"]);
+    assert_shows(&console.next_step(), &["Up Down PgUp PgDn scroll, any other key closes."]);
+}
+
+#[test]
+fn an_old_answer_from_before_a_dialog_does_not_stand_below_it() {
+    let mut console = Console::ready();
+    let line = " colours for a light background\n";
+    console.press(&["W"]);
+    assert_shows(&console.screen(80, 24), &[line]);
+    console.press(&["?"]);
+    assert_shows(&console.screen(80, 24), &[line]);
+    console.wait(16_000);
+    assert!(!console.screen(80, 24).contains("colours for a light background\n"), "{}", console.screen(80, 24));
+    // A warning stays, and what comes while the dialog is open is shown.
+    console.answer("override Fx = 120", false, "the trial runs already");
+    assert_shows(&console.screen(80, 24), &["refused: the trial runs already"]);
+}
+
+/// Regression: Enter in a form without changes read as a failure, and numbers of one had plurals.
+#[test]
+fn an_unchanged_form_and_a_single_trial_read_well() {
+    let mut console = Console::ready();
+    console.press(&["o", "Enter"]);
+    assert_eq!(console.said(), "no value was changed: the proposal stays as it is");
+    assert_eq!(OperatorRequest::Continue(1).to_string(), "continue for 1 trial");
+    assert_eq!(OperatorRequest::Continue(5).to_string(), "continue for 5 trials");
+    let fix = OperatorRequest::Fix { parameter: "Fx".into(), value: 60.0, trials: 1 };
+    assert_eq!(fix.to_string(), "fix Fx = 60 for 1 trial");
+    assert_eq!(OperatorRequest::ConfirmBest { repeats: 1 }.to_string(), "confirm the best with 1 repeat");
+}
+
+/// Regression: the queue of a replay offered the keys that move and remove, and refused them.
+#[test]
+fn the_queue_of_a_replay_offers_no_key_that_is_refused() {
+    let mut console = Console::ready();
+    let point = QueuedPoint { trial: 3, source: ProposalSource::Operator, ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
+    console.press(&["N"]);
+    assert_shows(&console.next_step(), &["Left earlier, Right later, x removes"]);
+    console.update(Msg::Replay(ReplayStatus::default()));
+    assert_eq!(console.next_step(), "Up Down choose, Enter closes.");
 }

@@ -382,3 +382,66 @@ fn the_help_of_a_waiting_trial_begins_with_the_verdicts() {
     assert_eq!(first(&mut Console::review(Mode::Review, Verdict::Accept)).as_deref(), Some("Verdict"));
     assert_eq!(first(&mut Console::ready()).as_deref(), Some("Robot"));
 }
+
+/// Regression: the line offered `a` while another row was selected, and `a` was refused.
+#[test]
+fn the_next_step_leads_to_the_waiting_trial_while_another_row_is_selected() {
+    let mut console = landed(0);
+    console.press(&["2"]);
+    assert_shows(&console.next_step(), &["Judge it: a accept (suggested)"]);
+    console.press(&["Up"]);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let last = screen.lines().last().unwrap();
+        assert_shows(last, &["Trial 1 waits for its verdict: select its row or press 1."]);
+        assert!(!last.contains("accept") && !last.contains("Judge"), "{last}");
+    }
+    assert_eq!(console.requests(&["a"]), [], "it is refused");
+    console.press(&["1"]);
+    assert_shows(&console.next_step(), &["Judge it: a accept (suggested)"]);
+    // No filter hides the trial that waits.
+    for keys in [&["2", "F"][..], &["F"], &["F"], &["F", "b"]] {
+        console.press(keys);
+        let waits = console.model.trial_rows().iter().any(|row| row.trial == 1);
+        assert!(waits, "{keys:?}:\n{}", console.screen(80, 24));
+    }
+    assert_eq!(console.requests(&["End", "a"]), [OperatorRequest::Judge(Verdict::Accept)]);
+}
+
+/// Regression: the second press of a verdict was refused because no trial waited any longer, as if the first had failed.
+#[test]
+fn a_verdict_key_that_is_pressed_twice_judges_once_and_keeps_the_first_answer() {
+    for (key, verdict) in [("a", Verdict::Accept), ("f", Verdict::Fall), ("v", Verdict::Void)] {
+        // Before the answer of the session and after it.
+        for answered in [false, true] {
+            let mut console = landed(0);
+            assert_eq!(console.requests(&[key]), [OperatorRequest::Judge(verdict)]);
+            if answered {
+                console.answer(verdict.name(), true, "trial 1; u takes it back");
+                console.record(Record::Trial(trial(1, Some(verdict), Some(Verdict::Accept))));
+                console.stage(ExperimentStage::Proposed, 2);
+            }
+            let said = console.said().to_owned();
+            assert_eq!(console.requests(&[key]), [], "{key}, answered: {answered}");
+            assert_eq!(console.said(), said);
+            // Later the key is an answer of its own.
+            console.wait(1_000);
+            let later = console.requests(&[key]);
+            assert_eq!(later.is_empty(), answered, "{key}: {}", console.said());
+        }
+    }
+}
+
+/// Regression: void alone gives a point up, and the line did not name the key that runs it again.
+#[test]
+fn after_a_cancelled_countdown_the_line_names_the_key_that_keeps_the_point() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    let cause = "cancelled by the operator".into();
+    console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Void)) }));
+    console.stage(ExperimentStage::Review, 0);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(screen.lines().last().unwrap(), &["Judge it: v void (suggested)", "r re-run of this point"]);
+    }
+}

@@ -277,16 +277,51 @@ fn a_refusal_is_reported_with_its_reason_and_logged() {
 }
 
 #[test]
-fn a_stopped_robot_is_acknowledged_with_k_or_enter() {
-    for key in ["k", "Enter"] {
-        for mode in [Mode::Damped, Mode::Fault] {
-            let mut console = Console::proposed();
-            console.mode(mode);
-            assert_eq!(console.requests(&[key]), [OperatorRequest::Acknowledge]);
+fn a_stopped_robot_is_acknowledged_with_k_alone() {
+    for mode in [Mode::Damped, Mode::Fault] {
+        let mut console = Console::proposed();
+        console.mode(mode);
+        for key in ["Enter", "Esc", "y", "a", "Tab"] {
+            assert_eq!(console.requests(&[key]), [], "{key} in {mode:?}");
         }
+        let mut console = Console::proposed();
+        console.mode(mode);
+        assert_eq!(console.requests(&["k"]), [OperatorRequest::Acknowledge]);
     }
     let mut console = Console::proposed();
     assert_eq!(console.press(&["k"]), []);
+}
+
+/// Regression: the form closed without a word, and Enter, meant for it, acknowledged the stop.
+#[test]
+fn stop_over_a_form_says_that_its_values_are_not_applied_and_enter_acknowledges_nothing() {
+    let mut console = Console::ready();
+    assert_eq!(console.press(&["o", "Down", "1", "2", "0", "F12"]), [Effect::Stop]);
+    assert_eq!(console.said(), "STOP: damping. The form was closed, its values are not applied");
+    console.mode(Mode::Damped);
+    assert_eq!(console.requests(&["Enter"]), [], "meant for the form");
+    assert_eq!(console.requests(&["Esc", "k"]), [OperatorRequest::Acknowledge]);
+    let mut unchanged = Console::ready();
+    unchanged.press(&["o", "F12"]);
+    assert_eq!(unchanged.said(), "STOP: damping");
+}
+
+/// Regression: a dialog that stays open over a stop, or one of another person's, offered its own keys alone.
+#[test]
+fn every_open_dialog_says_first_that_the_robot_was_stopped() {
+    for (mode, word) in [(Mode::Damped, "STOPPED"), (Mode::Fault, "FAULT")] {
+        for keys in [&["m"][..], &["?"], &[":"], &["P"], &["N"], &["R"], &["T"], &["2", "Enter"], &["q"]] {
+            let mut console = Console::review(Mode::Review, Verdict::Accept);
+            console.press(keys);
+            assert!(console.model.dialog.is_some(), "{keys:?}");
+            console.mode(mode);
+            let way = if keys.len() > 1 { "" } else { "Esc, then " };
+            let step = console.next_step();
+            assert!(step.starts_with(&format!("{word}: {way}k acknowledges. ")), "{keys:?}: {step}");
+            let sent = if keys.len() > 1 { console.requests(&["k"]) } else { console.requests(&["Esc", "k"]) };
+            assert_eq!(sent, [OperatorRequest::Acknowledge], "{keys:?}");
+        }
+    }
 }
 
 #[test]
@@ -313,7 +348,7 @@ fn an_observer_and_a_replay_send_nothing() {
                     let sent = console.requests(&[key]);
                     // An observer's STOP stops the robot, so an observer may acknowledge it.
                     let stopped = name == "observer" && matches!(mode, Mode::Damped | Mode::Fault);
-                    let acknowledges = usize::from(stopped && ["k", "Enter"].contains(&key));
+                    let acknowledges = usize::from(stopped && key == "k");
                     let expected = &[OperatorRequest::Acknowledge][..acknowledges];
                     assert_eq!(sent, expected, "{name}, {key} in {mode:?}, {stage:?}");
                 }

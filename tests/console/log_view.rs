@@ -6,8 +6,9 @@ mod support;
 mod pty;
 
 use pty::Session;
-use quadfrog::recording::record::{LogLevel, LogRecord, Record, SessionInfo};
+use quadfrog::recording::record::{LogLevel, LogRecord, Record, SessionInfo, Stamped};
 use quadfrog::telemetry::Mode;
+use quadfrog_console::message::{Msg, ReplayStatus, ReplayTimeline};
 use support::{Console, assert_shows, line_with, session};
 
 /// A console whose log has these lines.
@@ -51,6 +52,34 @@ fn a_line_opens_whole_and_shows_its_neighbours() {
     }
 }
 
+/// Regression: in the replay of a study that was continued hours later, all lines had the times of the first session.
+#[test]
+fn lines_of_a_replay_have_the_time_of_the_session_that_recorded_them() {
+    let mut console = logged(&[]);
+    let utc_ns = |text: &str| text.parse::<jiff::Timestamp>().unwrap().as_nanosecond() as u64;
+    let second = 1_000_000_000;
+    // The second session began five hours later; of the pause 1 s is played.
+    let begins_utc_ns = vec![(0, utc_ns("2026-03-04T10:20:30Z")), (61 * second, utc_ns("2026-03-04T15:47:01Z"))];
+    console.update(Msg::Replay(ReplayStatus { duration_ns: 90 * second, ..ReplayStatus::default() }));
+    console.update(Msg::Timeline(Box::new(ReplayTimeline { begins_utc_ns, ..ReplayTimeline::default() })));
+    for (at_s, message) in [(12, "the first"), (61, "the second"), (71, "the third")] {
+        let record = Record::Log(LogRecord { level: LogLevel::Info, source: "test".into(), message: message.into() });
+        console.update(Msg::Record(Stamped { time_ns: at_s * second, record }));
+    }
+    let screen = console.screen(120, 40);
+    // Minutes and seconds are the same in all time zones but those of half an hour.
+    for (message, minutes, at) in [
+        ("the first", ["20:42", "50:42"], "0:12.000"),
+        ("the second", ["47:01", "17:01"], "1:01.000"),
+        ("the third", ["47:11", "17:11"], "1:11.000"),
+    ] {
+        let line = line_with(&screen, message);
+        assert!(minutes.iter().any(|time| line.contains(time)) && line.contains(at), "{message}:\n{screen}");
+    }
+    console.press(&["Enter"]);
+    assert_shows(&console.screen(120, 40), &["1:11.000 of the replay"]);
+}
+
 #[test]
 fn a_line_longer_than_the_screen_scrolls_to_its_end() {
     let long = "word ".repeat(900) + "amphibian";
@@ -62,11 +91,12 @@ fn a_line_longer_than_the_screen_scrolls_to_its_end() {
 }
 
 #[test]
-fn enter_in_the_log_still_acknowledges_a_stop_first() {
+fn enter_in_the_log_opens_its_line_and_acknowledges_no_stop() {
     let mut console = logged(&["a line"]);
     console.mode(Mode::Damped);
-    assert_eq!(console.requests(&["Enter"]).len(), 1);
-    assert!(console.model.dialog.is_none());
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_shows(&console.next_step(), &["STOPPED: Esc, then k acknowledges."]);
+    assert_eq!(console.requests(&["Esc", "k"]).len(), 1);
 }
 
 #[test]

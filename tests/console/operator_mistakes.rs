@@ -177,6 +177,9 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     // An undone verdict.
     session.send("u");
     session.wait_for(&[&format!("Trial #{trial}: judge it")]);
+    session.send("6");
+    session.wait_for(&[&format!("undo the verdict: the verdict of trial {trial} is taken back")]);
+    session.send("1");
     judge_as_suggested(&mut session, trial);
 
     // The connection breaks in the countdown or the jump.
@@ -189,6 +192,18 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     let place = recordings.to_str().expect("a path");
     let mut session = Session::start(folder.path(), (80, 24), &["--resume", place]);
     session.wait_for(&["Press A to arm", "re-run of #"]);
+
+    // The best trial of the session before is laid under the charts, once its recording is read.
+    for _ in 0..40 {
+        session.send("c");
+        std::thread::sleep(Duration::from_millis(500));
+        if session.screen().contains("is laid under the charts of a jump") {
+            break;
+        }
+    }
+    session.wait_for(&["is laid under the charts of a jump"]);
+    session.send("c");
+    session.wait_for(&["no trial is laid under the charts"]);
 
     // A verdict of an earlier trial is changed, with the reason.
     session.send("2");

@@ -199,10 +199,17 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
         session.send("}");
         session.wait_for(&[&shown(span(trial).begin_ns)]);
     }
+    // After the last one it stays there and says so.
     session.send("}");
+    session.wait_for(&["no further fall or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.send(")");
     session.wait_for(&[&shown(timeline().duration_ns())]);
+    session.send("]");
+    session.wait_for(&["no further trial or fault", &shown(timeline().duration_ns())]);
     session.send("{");
     session.wait_for(&[&shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.send("([");
+    session.wait_for(&["no earlier trial or fault", "00:00.000"]);
 }
 
 /// Lets time pass; the state of the replay after it.

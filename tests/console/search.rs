@@ -102,12 +102,20 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
         let sent = console.requests(&["Enter"]);
         (sent, console.screen(80, 24))
     };
-    let (sent, _) = typed("50..120.5");
-    assert_eq!(sent, [OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.5 }]);
+    // Space is STOP here, so that another sign separates the numbers.
+    for text in ["50..120.5", "50,120.5", "50..120,5", "50.0,120.5"] {
+        let (sent, _) = typed(text);
+        let expected = OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.5 };
+        assert_eq!(sent, [expected], "{text}");
+    }
+    let mut open = overriding();
+    open.press(&["B"]);
+    assert_shows(&open.screen(80, 24), &["write it as 50..120 or 50,120, without a space"]);
     for (text, reason) in [
         ("120..50", "120 is not below 50"),
         ("50", "is no range; write it as 50..120"),
         ("50..fast", "was not taken"),
+        ("50,60,70", "is no range; write it as 50..120 or 50,120"),
         ("50..220", "Fx may be searched from 0 to 200 N (safety.toml)"),
     ] {
         let (sent, screen) = typed(text);
@@ -349,7 +357,13 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     assert_eq!(*config.first(Task::Forward), first, "the point that a study begins with");
     let gains = config.task(Task::Forward);
     assert_eq!((gains.kp, gains.kd), (450.0, 8.0));
-    assert!(export::best(&console.model).expect_err("once").to_string().contains("best-trial-2"), "nothing is lost");
+    // Regression: a second export ended with "entity already exists".
+    let kept = std::fs::read_to_string(best.join("optimize.toml")).expect("the first one");
+    for number in [2, 3] {
+        let again = export::best(&console.model).expect("written beside the first");
+        assert_eq!(again, folder.path().join(format!("best-trial-2-{number}")));
+    }
+    assert_eq!(std::fs::read_to_string(best.join("optimize.toml")).expect("the first one"), kept, "nothing is lost");
     let table = export::table(&console.model, ExportedRows::All).expect("written");
     assert_eq!(std::fs::read_to_string(table).expect("the table").lines().count(), 5);
     // A folder that cannot be written is named.

@@ -316,3 +316,27 @@ fn a_study_of_gp_that_ended_within_a_trial_continues_with_the_same_bits() {
         assert_eq!(counted_trials(&study.join("study.log")), counted_trials(&whole), "trial {interrupted}");
     }
 }
+
+/// Regression: attributes of the program's own search were shown as they are stored, `fixed: f0 from 11, trials 1, value 0.97`.
+#[test]
+fn fixed_parameters_and_a_confirmation_are_shown_as_sentences() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--seed", "0"]);
+    let study = program.study("recordings");
+    let journal = study.join("study.log");
+    let mut text = fs::read_to_string(&journal).unwrap();
+    for attribute in [
+        r#"{"fixed":{"f0":{"from":11,"trials":1,"value":0.9719578839321814}}}"#,
+        r#"{"confirm":null}"#,
+        r#"{"confirmed":{"confidence":0.962,"leader":0,"sure":true,"trials":[0,1]}}"#,
+    ] {
+        text += &format!("{{\"op_code\":2,\"worker_id\":\"test\",\"study_id\":0,\"user_attr\":{attribute}}}\n");
+    }
+    fs::write(&journal, text).unwrap();
+    let shown = program.text(&["study", "show", study.to_str().unwrap()]);
+    assert_shows(&shown, &["f0 was fixed at 0.971958 for 1 counted trial, from trial 11"]);
+    assert_shows(&shown, &["confirmation of the best: the point of trial 0 leads with 96.2 % confidence"]);
+    for raw in ["confirm:", "confirmed:", "fixed:", "model_best", "none"] {
+        assert!(!shown.contains(raw), "{raw}:\n{shown}");
+    }
+}

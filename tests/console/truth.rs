@@ -2,11 +2,17 @@
 
 mod support;
 
-use quadfrog::recording::record::{ArmingCheckRecord, Record};
+use quadfrog::engine::ObserverStatus;
+use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, Transition};
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TrialInhibit};
-use quadfrog::trial::{Backend, DrawnRange, ExperimentStage, SearchStatus, SearchedParameter, TrialRecord, Verdict};
+use quadfrog::telemetry::{
+    ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TransitionCause, TrialInhibit,
+};
+use quadfrog::trial::{
+    Backend, DrawnRange, ExperimentStage, PointRecord, ProposalSource, SearchStatus, SearchedParameter, TrialRecord,
+    Verdict,
+};
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use support::{Console, assert_shows, line_with, session, tick, trial};
@@ -240,4 +246,166 @@ fn the_card_of_a_landed_trial_shows_the_whole_cause() {
     let cause = FallCause::BodyContact.to_string();
     console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Fall)) }));
     assert_shows(&console.screen(80, 24), &["fall (a part", "ground)"]);
+}
+
+/// Regression: after `--resume` with fewer `--trials` than counted the console said that a study of 2 was finished, not why.
+#[test]
+fn a_study_with_more_counted_trials_than_wanted_says_so_at_the_start() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.record(Record::Search(SearchStatus { budget: 2, counted: 20, ..SearchStatus::default() }));
+    console.stage(ExperimentStage::Finished, 0);
+    assert_shows(console.said(), &["20 trials already count; the study is finished: the best is trial 0"]);
+}
+
+/// A recording that is followed: `behind_s` from its end, which is `silent_s` old.
+fn followed(behind_s: u64, silent_s: u64, watched: bool) -> Console {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus {
+        playing: true,
+        silent_ns: Some(silent_s * 1_000_000_000),
+        behind_ns: behind_s * 1_000_000_000,
+        observer: watched.then(ObserverStatus::default),
+        ..ReplayStatus::default()
+    }));
+    console
+}
+
+/// Regression: after a pause the screen stayed 20 s behind and said FOLLOWING and "about 1 s behind".
+#[test]
+fn a_followed_recording_says_how_old_what_it_shows_is() {
+    for watched in [false, true] {
+        for (behind_s, silent_s, old) in [(0, 1, None), (1, 0, None), (2, 0, None), (20, 0, Some("OLD: 20 s behind"))] {
+            for (columns, rows) in [(80, 24), (100, 30), (120, 40)] {
+                let screen = followed(behind_s, silent_s, watched).screen(columns, rows);
+                assert_eq!(screen.contains("FOLLOWING"), old.is_none(), "{screen}");
+                assert_eq!(screen.contains("OLD"), old.is_some(), "{screen}");
+                let last = screen.lines().last().unwrap();
+                if let Some(old) = old {
+                    assert_shows(&screen, &[old]);
+                    assert_shows(last, &["Behind by 20 s: ) shows the present.", "q quit"]);
+                }
+                assert_eq!(last.contains("about 1 s behind"), watched && old.is_none(), "{last}");
+            }
+        }
+    }
+    let silent = followed(0, 7, true).screen(120, 40);
+    assert_shows(&silent, &["OLD: nothing new for 7 s", "Nothing new for 7 s. STOP reaches its robot at once."]);
+    // The first key beside the sentence is the way out.
+    let last = followed(0, 0, true).screen(100, 30).lines().last().unwrap().to_owned();
+    assert_shows(&last, &["q quit"]);
+}
+
+/// Regression: battery, temperature and clock of a silent robot stayed on the screen as if they were of now.
+#[test]
+fn a_silent_robot_has_no_battery_temperature_and_clock() {
+    let mut console = hardware();
+    let shown = |console: &mut Console, time_ms: u64, mode: Mode| {
+        let mut tick = state_of(time_ms, 495, mode);
+        tick.state.battery = Some(Battery { charge_percent: 71.0, voltage_v: 24.1, ..Battery::default() });
+        tick.state.motor_temperature_c = [45.0; 12];
+        console.tick(tick);
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+    };
+    shown(&mut console, 495, Mode::Ready);
+    console.press(&["5"]);
+    assert_shows(&console.screen(120, 40), &["hottest 45 C", "battery 71 %", "robot clock  0.5 s"]);
+    (500..700).step_by(5).for_each(|time_ms| shown(&mut console, time_ms, Mode::Fault));
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert!(!screen.contains("71 %") && !screen.contains("45 C") && !screen.contains("0.5 s"), "{screen}");
+    }
+    assert_shows(&console.screen(120, 40), &["hottest -", "battery -", "robot clock  -"]);
+}
+
+/// Regression: at 80 columns the second line of a replay ended in `SLOW JUM`.
+#[test]
+fn the_second_line_drops_whole_values_in_order_before_it_cuts_a_warning() {
+    let mut console = Console::ready();
+    let mut tick = tick(5, 0.0, None);
+    tick.state.motor_temperature_c = [45.0; 12];
+    tick.state.battery = Some(Battery { charge_percent: 71.0, ..Battery::default() });
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+    let replay = ReplayStatus { slow_motion: true, looping: Some(12), lost_ns: 1_234_000_000, ..Default::default() };
+    console.update(Msg::Replay(replay));
+    for columns in [80, 100, 120, 200] {
+        let screen = console.screen(columns, 40);
+        let second = screen.lines().nth(1).unwrap();
+        assert_shows(second, &["recorded: no robot to stop", "LOST 1.234 s", "LOOP #12", "SLOW JUMPS"]);
+        assert_shows(second, &["71 %"]);
+        assert_eq!(second.contains("45 C"), columns >= 120, "{second}");
+    }
+}
+
+/// Regression: `confirm..` beside empty columns.
+#[test]
+fn the_source_of_a_repeat_is_whole() {
+    let mut console = Console::ready();
+    for (number, source) in [(3, ProposalSource::Confirm), (4, ProposalSource::Rerun)] {
+        let row = trial(number, Some(Verdict::Accept), None);
+        console.record(Record::Trial(TrialRecord { source, parent: Some(123), ..row }));
+    }
+    console.press(&["2"]);
+    for (columns, rows) in [(120, 40), (200, 60)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&screen, &["confirm 123", "re-run 123"]);
+    }
+}
+
+/// Regression: an observer's STOP in the countdown read as the operator's own.
+#[test]
+fn the_stop_of_an_observer_names_who_stopped() {
+    let log = |text: &str| LogRecord { level: LogLevel::Warning, source: "session".into(), message: text.into() };
+    let by = "STOP by Grace, who watches this session";
+    for log_first in [true, false] {
+        let mut console = Console::ready();
+        console.mode(Mode::Countdown);
+        let stopped = Record::Transition(Transition {
+            from: Mode::Countdown,
+            to: Mode::Damped,
+            cause: TransitionCause::Stop.to_string(),
+        });
+        let mut records = vec![Record::Log(log(by)), stopped];
+        if !log_first {
+            records.reverse();
+        }
+        records.into_iter().for_each(|record| drop(console.record(record)));
+        assert_eq!(console.said(), by);
+        let tick = Tick { mode: Mode::Damped, ..console.model.snapshot.tick };
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+        assert_shows(&console.next_step(), &["STOPPED; check the robot, then k acknowledges: STOP by Grace"]);
+    }
+}
+
+/// The result of confirming the best is part of the end of the study and of its tables.
+#[test]
+fn the_end_of_a_confirmed_study_names_the_result() {
+    let mut console = Console::ready();
+    let row = trial(0, Some(Verdict::Accept), None);
+    console.record(Record::Trial(row.clone()));
+    console.record(Record::Points(vec![PointRecord {
+        trials: vec![0, 5, 8],
+        parameters: row.parameters.clone(),
+        without_fall: 3,
+        mean: 0.41,
+        deviation: Some(0.01),
+        contender: true,
+        confidence: Some(0.962),
+    }]));
+    console.stage(ExperimentStage::Finished, 8);
+    let result = "the point of trial 0 leads with 96.2 % confidence: mean 0.410 +- 0.010 m, stood 3 of 3";
+    assert_shows(console.said(), &["the study is finished: the best is trial 0", result]);
+    console.press(&["R"]);
+    assert_shows(&console.screen(200, 60), &["Confirmation of the best"]);
+}
+
+/// Repeats that confirm the best are beyond the budget, with and without the session's own number.
+#[test]
+fn repeats_do_not_count() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    let repeat = TrialRecord { source: ProposalSource::Confirm, ..trial(1, Some(Verdict::Accept), None) };
+    console.record(Record::Trial(repeat));
+    console.stage(ExperimentStage::Finished, 1);
+    assert_shows(&console.screen(120, 40), &["1 of 20 counted"]);
 }

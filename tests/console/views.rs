@@ -10,7 +10,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot};
 use quadfrog::trial::{Displacement, DrawnRange, ExperimentStage, JumpRow, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
-use quadfrog_console::message::{Effect, ExportedRows, Mouse, Msg};
+use quadfrog_console::message::{Effect, ExportedRows, Mouse, Msg, ReplayStatus};
 use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::model::session::SessionModel;
@@ -192,12 +192,63 @@ fn any_two_trials_are_compared_in_live() {
     assert_eq!(console.said(), "no trial is laid under the charts");
 }
 
+/// Regression: at 80 columns the torques of two trials ended in `-0.03..`, and the cause of B's verdict was missing.
+#[test]
+fn two_trials_at_80_columns_have_whole_numbers_and_both_causes() {
+    let mut console = Console::ready();
+    for number in [0, 2] {
+        for time_ms in (0..1_000).step_by(5) {
+            let phase = if time_ms < 400 { Phase::Impulse } else { Phase::Landing };
+            let mut tick =
+                tick(1_000 + 2_000 * u64::from(number) + time_ms, 0.0, Some((number, time_ms as f64 / 1e3, phase)));
+            tick.state.joint_torque_n_m = [-10.034; 12];
+            console.tick(tick);
+        }
+        let cause = format!("cause {number}, landed and settled on a mat");
+        console.record(Record::Trial(TrialRecord { cause, ..trial(number, Some(Verdict::Accept), None) }));
+    }
+    console.press(&["2", "Home", "c", "End", "c", "1"]);
+    let in_sets = |console: &mut Console| {
+        (0..4)
+            .map(|_| {
+                console.press(&["t"]);
+                console.screen(80, 24)
+            })
+            .find(|screen| screen.contains("FR_hip"))
+            .expect("torques")
+    };
+    let screen = in_sets(&mut console);
+    assert_shows(&line_with(&screen, "FR_hip"), &["FR_hip -10.034/-10.034"]);
+    assert!(!line_with(&screen, "FR_hip").contains(".."), "{screen}");
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let replayed = console.screen(80, 24);
+    assert_shows(&replayed, &["Two trials", "A: cause 0", "B: cause 2"]);
+}
+
 #[test]
 fn a_trial_without_a_trace_cannot_be_a_ghost() {
     let mut console = jumped(&[1]);
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2", "Home", "c"]);
-    assert_eq!(console.said(), "no recorded signals for trial 0");
+    let earlier = "trial 0 was recorded in an earlier session: quadfrog replay recordings/forward shows it";
+    assert_eq!(console.said(), earlier);
+    // Elsewhere than in Trials the best trial is laid under the charts.
+    let mut resumed = Console::ready();
+    resumed.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    resumed.press(&["c"]);
+    assert_eq!(resumed.said(), earlier);
+}
+
+/// Regression: after `--resume` the review charts lacked the best trial although its recording exists.
+#[test]
+fn the_best_trial_of_an_earlier_session_is_laid_under_the_charts_once_it_is_read() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    let jump = |time_ms: u64| tick(time_ms, 0.1, Some((0, time_ms as f64 / 1e3 - 0.5, Phase::Impulse)));
+    let ticks = (0..1_000).step_by(5).map(jump).collect();
+    console.update(Msg::EarlierJump { trial: 0, ticks });
+    console.press(&["c"]);
+    assert_shows(console.said(), &["trial 0 is laid under the charts of a jump"]);
 }
 
 /// Twelve trials: accept, fall, void in turn.
@@ -525,6 +576,10 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
         played.press("]");
         times.push(played.time_ms());
     }
+    // After the last marker it stays there; another key goes to the end.
+    assert_eq!(played.console.said(), "no further trial or fault");
+    played.press(")");
+    times.push(played.time_ms());
     times.dedup();
     assert!(times.len() == 4 && times.is_sorted(), "{times:?}");
     assert_eq!(played.console.model.session.trials.records.len(), 3, "all trials at the end");
@@ -532,10 +587,12 @@ fn markers_take_a_replay_from_trial_to_trial_and_to_the_end() {
     let marker = played.time_ms();
     assert!(times.contains(&marker) && marker < times[times.len() - 1]);
     (0..20).for_each(|_| played.press("["));
+    assert_eq!((played.time_ms(), played.console.said()), (times[1], "no earlier trial or fault"));
+    played.press("(");
     assert_eq!(played.time_ms(), 0);
     assert_eq!(played.console.model.session.trials.records.len(), 0, "what was not yet, is not shown");
     // From the end, playing starts over.
-    (0..20).for_each(|_| played.press("]"));
+    played.press(")");
     played.press("p");
     played.wait(500);
     assert_eq!(played.time_ms(), 500);

@@ -194,7 +194,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::PageDown, "page-down", &["PgDn"], G::Views, "a page down"),
         row(A::First, "first", &["Home"], G::Views, "to the first"),
         row(A::Last, "last", &["End"], G::Views, "to the last"),
-        row(A::Open, "open", &["Enter"], G::Views, "details; acknowledges a stop; never starts motion; Trials of a replay: to the trial"),
+        row(A::Open, "open", &["Enter"], G::Views, "details; never starts motion, acknowledges no stop; Trials of a replay: to the trial"),
         row(A::Report, "report", &["R"], G::Views, "tables of the study, as quadfrog report prints them"),
 
         row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; while a trial waits for its verdict: that trial or the present"),

@@ -4,6 +4,7 @@
 use std::io;
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow};
@@ -20,7 +21,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
-use crate::feed::Feed;
+use crate::feed::{Feed, read_best_jump};
 use crate::graphics::GraphicsSupport;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
@@ -47,6 +48,8 @@ pub struct ConsoleOptions {
     pub settings: ConsoleSettings,
     /// The robot, its limits and its ground.
     pub robot: RobotFacts,
+    /// Recordings of earlier sessions of the study.
+    pub earlier: Vec<PathBuf>,
 }
 
 impl ConsoleOptions {
@@ -75,13 +78,19 @@ impl ConsoleOptions {
         if ascii {
             settings.glyphs = GlyphChoice::Ascii;
         }
-        ConsoleOptions { settings, robot: RobotFacts::default() }
+        ConsoleOptions { settings, robot: RobotFacts::default(), earlier: Vec::new() }
     }
 
     /// Adds the robot.
     #[must_use]
     pub fn with_robot(self, robot: RobotFacts) -> ConsoleOptions {
         ConsoleOptions { robot, ..self }
+    }
+
+    /// Adds the recordings of earlier sessions of the study: the charts show the jump of their best trial.
+    #[must_use]
+    pub fn with_earlier(self, earlier: Vec<PathBuf>) -> ConsoleOptions {
+        ConsoleOptions { earlier, ..self }
     }
 }
 
@@ -109,6 +118,8 @@ pub fn run(feed: Feed, options: ConsoleOptions) -> anyhow::Result<ConsoleExit> {
 
 struct Console {
     feed: Feed,
+    /// The jump of an earlier session, once it is read.
+    earlier: Option<Receiver<Msg>>,
     connection: ConnectionMonitor,
     /// State of the connection at the last heartbeat.
     connected: bool,
@@ -163,8 +174,10 @@ impl Console {
             Feed::Replay(_) => ConnectionMonitor::unmonitored(),
         };
         let now = Instant::now();
+        let earlier = Some(options.earlier).filter(|files| !files.is_empty()).map(read_best_jump);
         Ok(Console {
             feed,
+            earlier,
             connection,
             connected: true,
             model,
@@ -269,6 +282,10 @@ impl Console {
         self.last_feed = now;
         let news = self.feed.poll(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
         self.update_with(news);
+        if let Some(jump) = self.earlier.as_ref().and_then(|earlier| earlier.try_recv().ok()) {
+            self.earlier = None;
+            self.update_with([jump]);
+        }
     }
 
     /// Updates the model and performs the effects.

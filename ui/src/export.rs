@@ -32,16 +32,22 @@ pub fn table(model: &Model, rows: ExportedRows) -> anyhow::Result<PathBuf> {
 }
 
 /// Writes the newest configuration of the study with its best point and the gains of that trial, as a folder
-/// `best-trial-<number>` for `quadfrog --config`. Returns the folder; nothing is overwritten.
+/// `best-trial-<number>` for `quadfrog --config`, `best-trial-<number>-2` where that exists. Returns the folder; nothing is
+/// overwritten.
 ///
 /// # Errors
-/// When no trial was accepted, the study's configuration cannot be read, or a file is there already or cannot be written.
+/// When no trial was accepted, the study's configuration cannot be read, or a file cannot be written.
 pub fn best(model: &Model) -> anyhow::Result<PathBuf> {
     let (best, task) = model.session.trials.best().zip(model.session.info.task).context("no trial was accepted yet")?;
     let study = folder(model);
     let as_run = newest_config(&study).map(|(_, config)| config);
     let config = Config::load(as_run.as_deref())?;
-    let folder = study.join(format!("best-trial-{}", best.trial));
+    // A second export of the same trial may differ in its gains or its configuration: it has the next free name.
+    let name = format!("best-trial-{}", best.trial);
+    let names = std::iter::once(name.clone()).chain((2..1000).map(|number| format!("{name}-{number}")));
+    let free = names.map(|name| study.join(name)).find(|folder| !folder.exists());
+    let folder =
+        free.with_context(|| format!("{}: no name is free for another export", study.join(&name).display()))?;
     config.export(&folder, task, &best.parameters, &best.gains)?;
     Ok(folder)
 }

@@ -69,7 +69,7 @@ const MESSAGE_ROWS: usize = 3;
 
 /// The newest answer to the operator in rows of a terminal, each with a space before it; an old one begins with its age.
 pub fn message_rows(model: &Model, columns: u16) -> Vec<Line<'static>> {
-    let text = model.message.as_ref().map(|message| match message.age_min(model.clock) {
+    let text = model.shown_message().map(|message| match message.age_min(model.clock) {
         0 => Line::from(format!(" {}", message.text)),
         minutes => Line::from(format!(" {minutes} min ago: {}", message.text)),
     });

@@ -55,7 +55,11 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             may_request(model)?;
             require(model.trial_in_view().is_some(), "there is no trial yet")
         }
-        A::Ghost => require(model.history.traces().next().is_some(), "no jump has been recorded yet"),
+        A::Ghost => {
+            // Of a trial of an earlier session it says where that is.
+            let known = model.history.traces().next().is_some() || model.session.trials.best().is_some();
+            require(known, "no jump has been recorded yet")
+        }
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
             require(model.view == View::Trials, "only in the view Trials")
         }
@@ -242,7 +246,7 @@ fn may_clear_overrides(model: &Model) -> Legality {
 }
 
 /// While a trial waits for its verdict, no other row of Trials may be the selected one: a verdict could be meant for that.
-fn waiting_trial_is_meant(model: &Model) -> Legality {
+pub fn waiting_trial_is_meant(model: &Model) -> Legality {
     let waiting = model.session.under_review().map(|row| row.trial);
     let selected = model.selected_trial().map(|row| row.trial).filter(|_| model.view == View::Trials);
     match (waiting, selected) {

@@ -44,7 +44,14 @@ pub enum Msg {
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     Record(Stamped),
+    /// The jump of a trial of an earlier session, every fifth tick.
+    EarlierJump {
+        trial: u32,
+        ticks: Vec<Tick>,
+    },
     Replay(ReplayStatus),
+    /// An answer of the replay to a key.
+    Answer(String),
     /// The trials, faults and lost parts of the whole recording; again when they change.
     Timeline(Box<ReplayTimeline>),
     /// A result of judging the trials of a replay again.
@@ -191,10 +198,39 @@ pub struct ReplayStatus {
     pub present: Option<u32>,
     /// Time since the recording grew, ns, if it is being written and is followed.
     pub silent_ns: Option<u64>,
+    /// Time from the playhead to the end of the recording at its last growth, ns.
+    pub behind_ns: u64,
     /// The session that writes it, if its STOP can be reached.
     pub observer: Option<ObserverStatus>,
     /// Time that the parts found so far take that cannot be read, ns.
     pub lost_ns: u64,
+}
+
+/// Age from which what a followed recording shows counts as old, ns: the recording grows every second.
+const OLD_NS: u64 = 2_500_000_000;
+
+impl ReplayStatus {
+    /// Age of what is shown, ns: the playhead's distance to the end, and the time since there was a later one. None for a
+    /// recording that is not followed, and after the end of the session that wrote it.
+    pub fn age_ns(&self) -> Option<u64> {
+        let silent_ns = self.silent_ns.filter(|_| self.observer.is_none_or(|observer| !observer.ended))?;
+        Some(silent_ns.saturating_add(self.behind_ns))
+    }
+
+    /// Whether a followed recording is shown as it is at present.
+    pub fn shows_present(&self) -> bool {
+        self.age_ns().is_some_and(|age_ns| age_ns <= OLD_NS)
+    }
+
+    /// The age of what a followed recording shows if that is old, ns.
+    pub fn old_ns(&self) -> Option<u64> {
+        self.age_ns().filter(|age_ns| *age_ns > OLD_NS)
+    }
+
+    /// Whether a later part of the recording is known than the one that is shown as old.
+    pub fn later_is_known(&self) -> bool {
+        self.old_ns().is_some() && self.behind_ns > OLD_NS
+    }
 }
 
 /// The whole recording, wherever the playhead is.
@@ -208,6 +244,8 @@ pub struct ReplayTimeline {
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.
+    pub begins_utc_ns: Vec<(u64, u64)>,
     /// The second recording; none without one.
     pub second: Option<SecondRecording>,
 }
@@ -247,6 +285,13 @@ pub struct ComparedTrial {
 }
 
 impl ReplayTimeline {
+    /// The UTC time of a time of the replay, ns since 1970; none where the recording does not say when it began.
+    pub fn utc_ns(&self, time_ns: u64) -> Option<u64> {
+        let file = self.begins_utc_ns.partition_point(|(begin_ns, _)| *begin_ns <= time_ns).checked_sub(1)?;
+        let (begin_ns, utc_ns) = self.begins_utc_ns[file];
+        (utc_ns > begin_ns).then(|| utc_ns.saturating_add(time_ns - begin_ns))
+    }
+
     /// Whether the recording has ticks of a trial: a continued study shows rows of earlier ones, too.
     pub fn has_ticks_of(&self, trial: u32) -> bool {
         self.trials.iter().any(|span| span.trial == trial)

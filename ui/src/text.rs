@@ -40,6 +40,7 @@ pub fn report(session: &SessionModel) -> Vec<String> {
         jumps: jumps.unwrap_or(1).max(1) as u32,
         f1_hz: 0.0,
         parameters: info.parameters.iter().filter_map(|parameter| session.parameter(&parameter.name)).collect(),
+        confirmation: session.confirmation(),
         best: session.trials.best().map(|best| best.trial),
         model_best: session.trials.model_best,
         limits: None,

@@ -24,6 +24,9 @@ pub use server::ObserverServer;
 /// Longest line either end accepts, bytes.
 const LONGEST_LINE: u64 = 16_384;
 
+/// Begin of the message about a STOP of an observer; the name follows.
+pub const STOP_BY: &str = "STOP by ";
+
 /// Log line about an observer, for the session.
 pub type SessionNews = (LogLevel, String);
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use super::{Answer, Demand, SessionFacts, SessionNews, line, make_socket_folder, read_message};
+use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, line, make_socket_folder, read_message};
 use crate::realtime::channel::StopLatch;
 use crate::recording::record::LogLevel;
 
@@ -20,6 +20,8 @@ const PERIOD: Duration = Duration::from_millis(20);
 const LONGEST_WRITE: Duration = Duration::from_secs(1);
 /// Longest name of an observer, characters.
 const LONGEST_NAME: usize = 40;
+/// Time in which repeated demands of an observer are one in the log.
+const ONE_PRESS: Duration = Duration::from_millis(500);
 
 struct Shared {
     facts: SessionFacts,
@@ -126,13 +128,18 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
     writer.write_all(&line(&Answer::Session(shared.facts.clone()))?)?;
     let mut reader = BufReader::new(stream);
     let mut received = Vec::new();
+    let mut reported: Option<Instant> = None;
     while !shared.closing.load(Ordering::Relaxed) {
         let Some(demand) = read_message(&mut reader, &mut received)? else { continue };
         match demand {
             Demand::Stop => {
                 shared.stop.set();
-                let by = name.as_deref().unwrap_or("an observer");
-                shared.report(LogLevel::Warning, format!("STOP by {by}, who watches this session"));
+                // A press of a key may demand it twice, by the thread that reads the keys and by the screen.
+                if reported.is_none_or(|reported| reported.elapsed() > ONE_PRESS) {
+                    let by = name.as_deref().unwrap_or("an observer");
+                    shared.report(LogLevel::Warning, format!("{STOP_BY}{by}, who watches this session"));
+                    reported = Some(Instant::now());
+                }
                 writer.write_all(&line(&Answer::Stopped)?)?;
             }
             Demand::Watch(of) if name.is_none() => {

@@ -166,6 +166,14 @@ impl Player {
         self.start_utc_ns
     }
 
+    /// Returns the numbers of the trials of which ticks are recorded, of the countdown at least.
+    pub fn trials_with_ticks(&self) -> impl Iterator<Item = u32> + '_ {
+        self.markers.iter().filter_map(|marker| match marker.kind {
+            MarkerKind::Trial(trial) => Some(trial),
+            MarkerKind::Fault => None,
+        })
+    }
+
     /// Returns the time of the last message since the engine started, ns.
     pub fn duration_ns(&self) -> u64 {
         self.duration_ns

@@ -173,6 +173,21 @@ impl BestConfirmation {
     }
 }
 
+/// Returns the state or the result of the newest confirmation of a study as a sentence without its end; none without one.
+pub fn confirmation_in_words(study: &Study) -> Option<String> {
+    let kept = StudyAttributes::of(study.attributes());
+    if let Some(running) = kept.confirm {
+        let trials: Vec<String> = running.trials.iter().map(u32::to_string).collect();
+        let left = running.left(study.trials());
+        return Some(format!("the points of trials {} are repeated, at most {left} times more", trials.join(", ")));
+    }
+    let concluded = kept.confirmed?;
+    let points = compared(&concluded.trials, study);
+    let leader = points.iter().find(|point| point.trials.contains(&concluded.leader))?;
+    let short = if concluded.sure { "" } else { ", less than was wanted" };
+    Some(format!("{}{short}", lead_text(leader, concluded.confidence)))
+}
+
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
     StudyAttributes::of(study.attributes()).confirm
 }

@@ -21,6 +21,7 @@ mod search;
 mod trial_changes;
 mod verdict_change;
 
+pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;
 
@@ -43,9 +44,7 @@ use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::TrialState;
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
-use crate::trial::{
-    Backend, ExperimentStage, ParameterInfo, Proposal, ProposalSource, SearchStatus, TrialRecord, Verdict,
-};
+use crate::trial::{Backend, ExperimentStage, ParameterInfo, Proposal, SearchStatus, TrialRecord, Verdict};
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
@@ -208,12 +207,9 @@ impl Experiment {
         }
     }
 
-    /// Returns the number of trials that count so far; repeats that confirm the best are beyond the budget.
+    /// Returns the number of trials that count so far.
     pub fn counted(&self) -> u32 {
-        let counts = |row: &&TrialRecord| {
-            matches!(row.verdict, Some(Verdict::Accept | Verdict::Fall)) && row.source != ProposalSource::Confirm
-        };
-        self.rows.values().filter(counts).count() as u32
+        self.rows.values().filter(|row| row.counts()).count() as u32
     }
 
     /// Returns the unit of the objective.

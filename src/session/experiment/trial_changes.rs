@@ -225,7 +225,8 @@ impl Experiment {
 
     /// Raises the budget, also for sessions that continue the study or join it later.
     pub fn extend(&mut self, trials: u32) -> Result<(), RequestRefusal> {
-        let budget = self.plan.budget.saturating_add(trials);
+        // More trials may count already than a session with a smaller `--trials` wants.
+        let budget = self.plan.budget.max(self.counted()).saturating_add(trials);
         self.study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
         self.plan.budget = budget;
         match self.state {

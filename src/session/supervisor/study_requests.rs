@@ -1,7 +1,7 @@
 //! Requests that change the study, as jobs on the experiment.
 
 use crate::session::experiment::{Experiment, RequestRefusal};
-use crate::session::operator_request::OperatorRequest;
+use crate::session::operator_request::{OperatorRequest, counted};
 use crate::session::storage::JobOutput;
 use crate::trial::{Verdict, six_digits};
 
@@ -49,7 +49,11 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Fix { parameter, value, trials } => {
             experiment.fix(parameter, *value, *trials)?;
-            format!("{parameter} is {} for the next {trials} trials that count", six_digits(*value))
+            let next = match trials {
+                1 => "next trial that counts".to_owned(),
+                trials => format!("next {trials} trials that count"),
+            };
+            format!("{parameter} is {} for the {next}", six_digits(*value))
         }
         OperatorRequest::Unfix { parameter } => {
             experiment.unfix(parameter)?;
@@ -63,7 +67,10 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             let trials: Vec<String> = experiment.confirm_best(*repeats)?.iter().map(u32::to_string).collect();
             match trials.len() {
                 0 => "no more repeats".to_owned(),
-                _ => format!("the points of trials {} are repeated, at most {repeats} times", trials.join(", ")),
+                _ => {
+                    let most = if *repeats == 1 { "once".to_owned() } else { format!("{repeats} times") };
+                    format!("the points of trials {} are repeated, at most {most}", trials.join(", "))
+                }
             }
         }
         OperatorRequest::Rerun { trial: Some(trial) } => {
@@ -72,7 +79,10 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Undo => {
             experiment.undo()?;
-            "it waits for another".to_owned()
+            match experiment.under_review() {
+                Some(row) => format!("the verdict of trial {} is taken back; it waits for another", row.trial),
+                None => "it is taken back".to_owned(),
+            }
         }
         OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
             let before = experiment.change_verdict(*trial, *verdict, reason)?;
@@ -105,7 +115,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Continue(trials) => {
             experiment.extend(*trials)?;
-            format!("the study now has {} trials", experiment.budget())
+            format!("the study ends with {}", counted(experiment.budget(), "counted trial"))
         }
         _ => return Err(RequestRefusal::NotNow("this is no request to the study".to_owned())),
     })

@@ -124,7 +124,7 @@ fn compared(recording: &Timeline, trial: u32, named: bool) -> ComparedTrial {
 }
 
 /// Every fifth tick of a run.
-fn ticks(recording: &mut Timeline, run: &TrialRun) -> Vec<Tick> {
+pub(super) fn ticks(recording: &mut Timeline, run: &TrialRun) -> Vec<Tick> {
     recording.seek_sparse(run.begin_ns, u64::MAX, SHOWN_EVERY as u32);
     let mut ticks = Vec::new();
     for played in recording.by_ref() {

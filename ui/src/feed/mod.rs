@@ -1,6 +1,7 @@
 //! The source of the screen's messages: a running engine or a recording. Both give the same messages.
 
 mod beside;
+mod earlier;
 mod rejudge;
 mod replay;
 
@@ -11,6 +12,7 @@ use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::timeline::Timeline;
 
 use crate::message::{Msg, ReplayCommand};
+pub use earlier::read_best_jump;
 pub use replay::DamageWatch;
 use replay::ReplayFeed;
 

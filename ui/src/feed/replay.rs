@@ -31,6 +31,10 @@ const BEFORE_IMPULSE_NS: u64 = 500_000_000;
 /// Period of looking for what was appended to a followed file.
 const FOLLOW_NS: u64 = 250_000_000;
 
+/// Period in which a recording grows while it is written, and the distance to its end from which playback at the end catches up.
+const FLUSH_NS: u64 = 1_000_000_000;
+const MOST_BEHIND_NS: u64 = 2 * FLUSH_NS;
+
 /// Descriptions of the damage found so far, file by file; they outlive the feed.
 pub type DamageWatch = Arc<Mutex<Vec<String>>>;
 
@@ -46,6 +50,8 @@ pub struct ReplayFeed {
     follow_in_ns: Option<u64>,
     /// Time since the followed file grew, ns.
     silent_ns: u64,
+    /// Whether a followed file is played at its end: a stall of its writer is caught up.
+    at_present: bool,
     /// The end of a session that another process runs.
     observer: Option<Observer>,
     time_ns: u64,
@@ -74,6 +80,7 @@ impl ReplayFeed {
             looping: None,
             follow_in_ns: follow.then_some(FOLLOW_NS),
             silent_ns: 0,
+            at_present: follow,
             observer: None,
             time_ns: 0,
             next: VecDeque::new(),
@@ -118,8 +125,16 @@ impl ReplayFeed {
                 self.jump(0);
                 self.playing = true;
             }
+            // What was recorded meanwhile is skipped: a session that runs is watched as it is now.
+            ReplayCommand::PlayPause if !self.playing && self.follow_in_ns.is_some() => {
+                self.go_to_end();
+                self.playing = true;
+            }
             ReplayCommand::PlayPause => self.playing = !self.playing,
-            ReplayCommand::Slower => self.speed = self.speed.saturating_sub(1),
+            ReplayCommand::Slower => {
+                self.at_present = false;
+                self.speed = self.speed.saturating_sub(1);
+            }
             ReplayCommand::Faster => self.speed = (self.speed + 1).min(SPEEDS.len() - 1),
             ReplayCommand::SlowMotion => self.slow_motion = !self.slow_motion,
             ReplayCommand::Forward(step) => {
@@ -132,12 +147,16 @@ impl ReplayFeed {
                 self.playing = false;
                 self.go_to(at.saturating_sub(length_ns(step)));
             }
-            ReplayCommand::NextMarker => self.go_to(after(self.markers(), at).unwrap_or(end_ns)),
-            ReplayCommand::PreviousMarker => self.go_to(before(self.markers(), self.passed()).unwrap_or(0)),
-            ReplayCommand::NextFall => self.go_to(after(self.falls(), at).unwrap_or(end_ns)),
-            ReplayCommand::PreviousFall => self.go_to(before(self.falls(), self.passed()).unwrap_or(0)),
+            ReplayCommand::NextMarker => self.go_to_place(after(self.markers(), at), "no further trial or fault"),
+            ReplayCommand::PreviousMarker => {
+                self.go_to_place(before(self.markers(), self.passed()), "no earlier trial or fault");
+            }
+            ReplayCommand::NextFall => self.go_to_place(after(self.falls(), at), "no further fall or fault"),
+            ReplayCommand::PreviousFall => {
+                self.go_to_place(before(self.falls(), self.passed()), "no earlier fall or fault");
+            }
             ReplayCommand::Start => self.go_to(0),
-            ReplayCommand::End => self.go_to(end_ns),
+            ReplayCommand::End => self.go_to_end(),
             ReplayCommand::Time(time_ns) => self.go_to(time_ns),
             ReplayCommand::Trial(trial) => {
                 if let Some(span) = self.whole.trials.iter().rev().find(|span| span.trial == trial) {
@@ -148,6 +167,7 @@ impl ReplayFeed {
             ReplayCommand::Loop => {
                 self.looping = self.present();
                 if let Some(span) = self.looping {
+                    self.at_present = false;
                     self.jump(loop_begin(&span));
                     self.playing = true;
                 }
@@ -165,8 +185,23 @@ impl ReplayFeed {
 
     /// Goes to a time; a loop ends where the time is not in it.
     fn go_to(&mut self, time_ns: u64) {
+        self.at_present = false;
         self.looping = self.looping.filter(|span| (span.begin_ns..=span.end_ns).contains(&time_ns));
         self.jump(time_ns);
+    }
+
+    /// Goes to the end, where a followed recording is played on.
+    fn go_to_end(&mut self) {
+        self.go_to(self.recording.duration_ns());
+        self.at_present = self.follow_in_ns.is_some();
+    }
+
+    /// Goes to a place; without one the replay stays where it is and reports that there is none.
+    fn go_to_place(&mut self, place: Option<u64>, none: &str) {
+        match place {
+            Some(time_ns) => self.go_to(time_ns),
+            None => self.jumped.push(Msg::Answer(none.to_owned())),
+        }
     }
 
     fn markers(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
@@ -218,6 +253,7 @@ impl ReplayFeed {
             looping: self.looping.map(|span| span.trial),
             present: present.map(|run| run.trial),
             silent_ns: self.follow_in_ns.map(|_| self.silent_ns),
+            behind_ns: self.recording.duration_ns().saturating_sub(self.time_ns),
             observer: self.observer.as_ref().map(Observer::status),
             lost_ns: self.recording.lost_ns(),
         }));
@@ -261,6 +297,10 @@ impl ReplayFeed {
                 self.silent_ns = 0;
                 self.list();
                 messages.append(&mut self.jumped);
+                let behind_ns = self.recording.duration_ns().saturating_sub(self.time_ns);
+                if self.at_present && self.playing && behind_ns > MOST_BEHIND_NS {
+                    self.advance(behind_ns - FLUSH_NS, messages);
+                }
             }
             Ok(false) => {}
             Err(error) => {
@@ -278,6 +318,7 @@ impl ReplayFeed {
             faults_ns: faults.map(|marker| marker.time_ns).collect(),
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
+            begins_utc_ns: self.recording.begins_utc_ns(),
             second: self.pair.second(),
         };
         self.jumped.push(Msg::Timeline(Box::new(self.whole.clone())));

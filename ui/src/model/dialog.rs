@@ -242,4 +242,9 @@ impl OverrideForm {
         let selected = selected.min(rows.len().saturating_sub(1));
         OverrideForm { trial: proposal.trial, rows, selected, typing: None, problem: None }
     }
+
+    /// Whether it holds values that the session has not received.
+    pub fn is_changed(&self) -> bool {
+        self.typing.is_some() || self.rows.iter().any(|row| row.value != row.before)
+    }
 }

@@ -222,6 +222,15 @@ impl SignalHistory {
         }
     }
 
+    /// Adds the trace of a trial of an earlier session; one of this session stays.
+    pub fn add_trace(&mut self, trial: u32, ticks: &[Tick]) {
+        let mut earlier = SignalHistory::default();
+        ticks.iter().for_each(|tick| earlier.push(tick));
+        if let Some(trace) = earlier.traces.remove(&trial) {
+            self.traces.entry(trial).or_insert(trace);
+        }
+    }
+
     /// Keeps the trace of a trial, the best, however old it is.
     pub fn keep(&mut self, trial: Option<u32>) {
         self.kept = trial;

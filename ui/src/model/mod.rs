@@ -27,6 +27,7 @@ use quadfrog::telemetry::{Mode, Snapshot};
 use quadfrog::trial::{Backend, ParameterInfo, TrialRecord};
 use strum::{IntoStaticStr, VariantArray};
 
+use crate::action::Action;
 use crate::column::Column;
 use crate::keymap::Keymap;
 use crate::message::{ReplayStatus, ReplayTimeline};
@@ -175,6 +176,10 @@ pub struct Model {
     pub rejudged: Option<RejudgedTable>,
     /// Whole seconds left of a countdown, as the bell last rang them.
     pub countdown_s: Option<u32>,
+    /// The newest verdict that was sent to the session, and when.
+    pub judged: Option<(Action, Duration)>,
+    /// When the open dialog was opened.
+    pub dialog_opened_at: Duration,
     /// Time of the last Ctrl-C.
     pub interrupted_at: Option<Duration>,
     /// The terminal's columns and rows.
@@ -241,12 +246,21 @@ impl Model {
             timeline: None,
             rejudged: None,
             countdown_s: None,
+            judged: None,
+            dialog_opened_at: Duration::ZERO,
             interrupted_at: None,
             size: (0, 0),
             first_frame: false,
             page: 10,
             mouse: settings.mouse,
         }
+    }
+
+    /// The answer or warning to show: an old answer from before the open dialog is none to what that asks.
+    pub fn shown_message(&self) -> Option<&Notice> {
+        let before = |message: &Notice| self.dialog.is_some() && message.at < self.dialog_opened_at;
+        let stale = |message: &Notice| message.level == LogLevel::Info && message.is_old(self.clock) && before(message);
+        self.message.as_ref().filter(|message| !stale(message))
     }
 
     /// Whether the robot sends no states: what is known of it is of an earlier time, or nothing.
@@ -334,7 +348,8 @@ impl Model {
 
     /// The rows of the trial table, sorted and filtered.
     pub fn trial_rows(&self) -> Vec<&TrialRecord> {
-        self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters)
+        let waiting = self.session.under_review().map(|row| row.trial);
+        self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters, waiting)
     }
 
     /// Every trial, by number: also those that the table does not show.

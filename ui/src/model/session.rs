@@ -140,12 +140,29 @@ impl SessionModel {
         self.search.as_ref()?.confirming
     }
 
-    /// The number of trials that count for the budget: the session's, or else those with a verdict other than void.
+    /// The number of trials that count for the budget.
     pub fn counted(&self) -> usize {
         match &self.search {
             Some(search) => search.counted as usize,
-            None => self.trials.count(Verdict::Accept) + self.trials.count(Verdict::Fall),
+            None => self.trials.records.values().filter(|row| row.counts()).count(),
         }
+    }
+
+    /// Result of the confirmation of the best; none while it runs and without one.
+    pub fn confirmation(&self) -> Option<String> {
+        let ended = self.confirming().is_none();
+        let (point, confidence) =
+            self.trials.points.iter().filter(|_| ended).find_map(|point| Some((point, point.confidence?)))?;
+        let spread = point.deviation.map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
+        Some(format!(
+            "the point of trial {} leads with {:.1} % confidence: mean {:.3}{spread} {}, stood {} of {}",
+            point.trials.first()?,
+            100.0 * confidence,
+            point.mean,
+            self.info.unit,
+            point.without_fall,
+            point.trials.len()
+        ))
     }
 
     pub(crate) fn budget(&self) -> u32 {

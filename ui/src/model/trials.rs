@@ -126,12 +126,14 @@ impl TrialTable {
         self.best_only || self.filter.is_some()
     }
 
-    /// The rows, sorted and filtered; `later` are those of a replay that follow after the playhead.
+    /// The rows, sorted and filtered; `later` are those of a replay that follow after the playhead, `waiting` is the trial that
+    /// waits for its verdict.
     pub fn rows<'a>(
         &self,
         trials: &'a Trials,
         later: impl Iterator<Item = &'a TrialRecord>,
         parameters: &[ParameterInfo],
+        waiting: Option<u32>,
     ) -> Vec<&'a TrialRecord> {
         let mut rows: Vec<&TrialRecord> = if self.best_only {
             trials.best_so_far().collect()
@@ -139,6 +141,10 @@ impl TrialTable {
             let all = trials.records.values().chain(later);
             all.filter(|trial| self.filter.is_none() || trial.verdict == self.filter).collect()
         };
+        // A filter never hides the trial that waits for its verdict.
+        let waits =
+            |trial: &&TrialRecord| waiting == Some(trial.trial) && !rows.iter().any(|row| row.trial == trial.trial);
+        rows.extend(trials.records.values().find(waits));
         let sort_value = |trial: &TrialRecord| {
             let value = match self.sort {
                 SortBy::Number => None,

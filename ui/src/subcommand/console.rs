@@ -11,6 +11,7 @@ use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog::recording::recorder::RecorderStatus;
+use quadfrog::recording::session_files::recordings_in;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::{HardwareError, Network};
 use quadfrog::trial::{Approval, Backend, Task};
@@ -164,6 +165,8 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         }
     };
     let console = console.with_robot(RobotFacts::new(robot.clone(), &config, backend, selected.seed.into()));
+    let earlier = if arguments.resume.is_some() { recordings_in(&selected.folder) } else { Vec::new() };
+    let console = console.with_earlier(earlier);
     let incomplete = incomplete_recordings(&selected.folder);
     let mut options = Options {
         seed: selected.seed,

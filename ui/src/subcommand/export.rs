@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCandidates;
-use quadfrog::recording::player::{MarkerKind, Player};
+use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
@@ -37,6 +37,9 @@ impl LayoutOf {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    override_usage = "quadfrog export [OPTIONS] <FILE>\n       quadfrog export --layout <VIEWER> [--output <OUT>]"
+)]
 pub struct ExportArguments {
     /// A recording: session.mcap, session.mcap.part of a session that runs or was cut off, or the folder of a study for all its
     /// files, one after the other
@@ -133,12 +136,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
 
 /// Refuses a trial of which no tick is recorded.
 fn require_trial(players: &[Player], trial: u32) -> Result<(), String> {
-    let number = |kind| match kind {
-        MarkerKind::Trial(number) => Some(number),
-        MarkerKind::Fault => None,
-    };
-    let trials: BTreeSet<u32> =
-        players.iter().flat_map(Player::markers).filter_map(|marker| number(marker.kind)).collect();
+    let trials: BTreeSet<u32> = players.iter().flat_map(Player::trials_with_ticks).collect();
     if trials.contains(&trial) {
         return Ok(());
     }

@@ -14,7 +14,8 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
-use quadfrog::session::experiment::{self, rows_of};
+use quadfrog::session::experiment::{self, confirmation_in_words, rows_of};
+use quadfrog::session::operator_request::counted;
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
 use quadfrog_console::{notice, output};
 use serde_json::Value;
@@ -155,7 +156,7 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let name = Some(study_name(stored.task, stored.seed));
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
     let trials = opened.study.trials();
-    let counted = trials.iter().filter(|trial| trial.state == TrialState::Complete).count();
+    let counted = rows_of(&opened.study, &opened.parameters).iter().filter(|row| row.counts()).count();
     let falls = trials.iter().filter(|trial| trial.is_fall()).count();
     let best = opened.study.best().and_then(|trial| trial.value);
     Ok(vec![
@@ -168,6 +169,10 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
         best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit())),
     ])
 }
+
+/// Attributes that `show` writes as sentences, or that the table says: values of the sampler's model, confirmations, fixed
+/// parameters.
+const OWN_SENTENCES: [&str; 4] = ["confirm", "confirmed", "fixed", "model_best"];
 
 /// Returns the row of the best trial.
 fn best_row<'a>(opened: &Opened, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
@@ -183,7 +188,8 @@ fn in_words(value: &Value, between: &str) -> String {
         Value::Object(members) if members.is_empty() => "none".to_owned(),
         Value::Array(list) => join(&mut list.iter().map(|value| in_words(value, between)), between),
         Value::Object(members) => {
-            join(&mut members.iter().map(|(name, value)| format!("{name} {}", in_words(value, between))), ", ")
+            let given = members.iter().filter(|(_, value)| !value.is_null());
+            join(&mut given.map(|(name, value)| format!("{name} {}", in_words(value, between))), ", ")
         }
         value => value.to_string(),
     }
@@ -195,8 +201,23 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let mut text = String::new();
     let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
     // The causes of changed verdicts stand in the table.
-    for (name, value) in study.attributes().iter().filter(|(name, _)| !name.starts_with(CHANGED_VERDICT)) {
+    let own = |name: &str| ours.is_some() && OWN_SENTENCES.contains(&name);
+    let left_out = |name: &str, value: &Value| name.starts_with(CHANGED_VERDICT) || value.is_null() || own(name);
+    for (name, value) in study.attributes().iter().filter(|(name, value)| !left_out(name, value)) {
         let _ = writeln!(text, "  {name}: {}", in_words(value, if name == "bounds" { " to " } else { " " }));
+    }
+    if ours.is_some() {
+        for (name, fixed) in study.attributes().get("fixed").and_then(Value::as_object).into_iter().flatten() {
+            let number = |key: &str| fixed.get(key).and_then(Value::as_f64);
+            let (Some(value), Some(trials), Some(from)) = (number("value"), number("trials"), number("from")) else {
+                continue;
+            };
+            let trials = counted(trials as u32, "counted trial");
+            let _ = writeln!(text, "  {name} was fixed at {} for {trials}, from trial {from}", six_digits(value));
+        }
+        if let Some(confirmation) = confirmation_in_words(study) {
+            let _ = writeln!(text, "  confirmation of the best: {confirmation}");
+        }
     }
     for parameter in parameters {
         let _ = writeln!(text, "  {} from {} to {} {}", parameter.name, parameter.low, parameter.high, parameter.unit);

@@ -33,6 +33,15 @@ pub use request::say;
 
 /// Folds one message into the model.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    let was_open = model.dialog.is_some();
+    let effects = fold(model, msg);
+    if model.dialog.is_some() && !was_open {
+        model.dialog_opened_at = model.clock;
+    }
+    effects
+}
+
+fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) => return press(model, key),
         Msg::Mouse(event) => return mouse::handle(model, event),
@@ -72,6 +81,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             beside::follow(model, &status);
             model.replay = Some(status);
         }
+        Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
+        Msg::Answer(text) => say(model, LogLevel::Info, text),
         Msg::Rejudged(news) => rejudged::apply(model, news),
         Msg::SideBySide(both) => beside::show(model, &both),
         Msg::Timeline(timeline) => model.timeline = Some(timeline),

@@ -1,5 +1,7 @@
 //! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
 
+use std::path::Path;
+
 use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::Verdict;
 use strum::VariantArray;
@@ -137,13 +139,26 @@ fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
         (Some(a), _) => {
             format!("trial {a} is laid under the charts of a jump; a second one in Trials compares the two")
         }
-        (None, Some(trial)) => no_signals(trial),
+        (None, Some(trial)) => no_signals(model, trial),
         (None, None) => "no trial was accepted yet".to_owned(),
     }
 }
 
-fn no_signals(trial: u32) -> String {
-    format!("no recorded signals for trial {trial}")
+/// Returns the reason for which the signals of a trial are not here, and the place where they are.
+fn no_signals(model: &Model, trial: u32) -> String {
+    if let Some(timeline) = &model.timeline {
+        return match timeline.has_ticks_of(trial) {
+            true => {
+                format!("trial {trial} was not played yet; {} on its row goes to it", model.keymap.key(Action::Open))
+            }
+            false => format!("the recording has no ticks of trial {trial}"),
+        };
+    }
+    let study = Path::new(&model.session.info.study).parent().unwrap_or(Path::new("")).display();
+    match model.session.trials.ran.contains_key(&trial) {
+        true => format!("the signals of trial {trial} are not kept any longer: quadfrog replay {study} shows them"),
+        false => format!("trial {trial} was recorded in an earlier session: quadfrog replay {study} shows it"),
+    }
 }
 
 fn second_ghost(model: &mut Model, a: u32) -> String {
@@ -160,7 +175,7 @@ fn second_ghost(model: &mut Model, a: u32) -> String {
             let live = model.keymap.key(Action::LiveView);
             format!("A is trial {a}, B is trial {b}: {live} shows both in Live")
         }
-        None => no_signals(b),
+        None => no_signals(model, b),
     }
 }
 

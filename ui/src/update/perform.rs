@@ -1,5 +1,7 @@
 //! The effect of each action.
 
+use std::time::Duration;
+
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::objective;
 use quadfrog::session::operator_request::OperatorRequest;
@@ -12,15 +14,26 @@ use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, ne
 use super::rejudged;
 use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
-use crate::legal::{legal, may_acknowledge, may_request};
+use crate::legal::{legal, may_request};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
 use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
 use crate::text::report;
 use crate::theme::Background;
 
+/// Time within which the same verdict is a key that was pressed twice: another trial cannot wait so soon.
+const DOUBLE_PRESS: Duration = Duration::from_secs(1);
+
 /// Performs an action, or reports why it is not possible.
 pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
+    // A key that was pressed twice judges once, and the first answer stays.
+    if let Some((judged, at)) = model.judged.take()
+        && judged == action
+        && model.clock.saturating_sub(at) < DOUBLE_PRESS
+    {
+        model.judged = Some((judged, at));
+        return Vec::new();
+    }
     if let Err(reason) = legal(action, model) {
         let key = model.keymap.key(action);
         say(model, LogLevel::Warning, format!("{key} is not possible: {reason}"));
@@ -245,11 +258,9 @@ fn queue_point(model: &mut Model) -> Vec<Effect> {
     request(model, OperatorRequest::Enqueue(point))
 }
 
-/// Enter: acknowledges, overrides, goes to the trial of a replay or opens the details; it never starts motion.
+/// Enter: overrides, goes to the trial of a replay or opens the details. It never starts motion and acknowledges no stop: it may
+/// have been meant for a dialog that the stop has closed.
 fn open_details(model: &mut Model) -> Vec<Effect> {
-    if may_acknowledge(model).is_ok() {
-        return request(model, OperatorRequest::Acknowledge);
-    }
     if model.view == View::Trials
         && let Some(trial) = model.selected_trial().map(|trial| trial.trial)
         && model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial))
@@ -277,11 +288,12 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
 /// Judges the trial under review. Without one the selected row of Trials: asks for the reason of the change.
 fn judge(model: &mut Model, verdict: Verdict) -> Vec<Effect> {
     if model.session.stage_is(ExperimentStage::Review) {
-        return if verdict == Verdict::Void {
-            void(model, false)
-        } else {
-            request(model, OperatorRequest::Judge(verdict))
-        };
+        if verdict == Verdict::Void {
+            return void(model, false);
+        }
+        let action = if verdict == Verdict::Fall { Action::Fall } else { Action::Accept };
+        model.judged = Some((action, model.clock));
+        return request(model, OperatorRequest::Judge(verdict));
     }
     if let Some(trial) = model.selected_trial().map(|row| row.trial) {
         open(model, Dialog::field(Purpose::ChangeVerdict { trial, verdict }, ""));
@@ -294,7 +306,10 @@ fn void(model: &mut Model, rerun: bool) -> Vec<Effect> {
     match model.session.under_review().filter(|row| objective::tripped_limit(row)).map(|row| row.trial) {
         Some(trial) => open(model, Dialog::field(Purpose::VoidReason { trial, rerun }, "")),
         None if rerun => return request(model, OperatorRequest::Rerun { trial: None }),
-        None => return request(model, OperatorRequest::Judge(Verdict::Void)),
+        None => {
+            model.judged = Some((Action::Void, model.clock));
+            return request(model, OperatorRequest::Judge(Verdict::Void));
+        }
     }
     Vec::new()
 }

@@ -1,5 +1,6 @@
 //! Applies the session's records to the model: rows, the log, the answer to the operator, the bell.
 
+use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
@@ -8,10 +9,10 @@ use super::request::say;
 use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;
-use crate::model::Model;
 use crate::model::dialog::{Dialog, Question};
 use crate::model::log::LogLine;
 use crate::model::trials::RunTime;
+use crate::model::{Model, Notice};
 use crate::settings::BellCause;
 
 /// Closes a question that no longer applies: an approval holds for the shown revision and while the robot stands.
@@ -70,8 +71,11 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                 Mode::Damped => LogLevel::Warning,
                 _ => LogLevel::Info,
             };
+            // The observer who stopped may have been reported before the stop.
+            let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
+            let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
             if stopped {
-                model.session.stopped_because = change.cause.clone();
+                model.session.stopped_because = by_observer.map_or(&change.cause, |message| &message.text).clone();
                 // The STOP key was answered already.
                 if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
                     say(model, level, format!("{}: {}", change.to.name(), change.cause));
@@ -102,7 +106,13 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
                             format!("the best is trial {trial}, J = {value:.3} {}", model.session.info.unit)
                         });
-                        let text = format!("the study is finished: {best}");
+                        let confirmed = model.session.confirmation();
+                        let best = confirmed.map_or(best.clone(), |confirmed| format!("{best}; {confirmed}"));
+                        let (counted, budget) = (model.session.counted(), model.session.budget());
+                        let text = match counted > budget as usize {
+                            true => format!("{counted} trials already count; the study is finished: {best}"),
+                            false => format!("the study is finished: {best}"),
+                        };
                         say(model, LogLevel::Info, text.clone());
                         log(model, time_ns, LogLevel::Info, "study", text, true);
                     }
@@ -142,6 +152,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         Record::Log(line) => {
             if line.level > LogLevel::Info {
                 say(model, line.level, line.message.clone());
+            }
+            if line.source == "session" && line.message.starts_with(STOP_BY) {
+                model.message.iter_mut().for_each(|message| message.stop = true);
+                model.session.stopped_because.clone_from(&line.message);
             }
             log(model, time_ns, line.level, &line.source, line.message, false);
         }

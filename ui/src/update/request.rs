@@ -77,12 +77,14 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
         say(model, LogLevel::Info, "this is a replay: there is no robot to stop");
         return Vec::new();
     }
+    let dropped = matches!(&model.dialog, Some(Dialog::Override(form)) if form.is_changed());
     if !matches!(model.dialog, Some(Dialog::Field { .. })) {
         model.dialog = None;
     }
-    let text = match model.session.info.observe {
-        true => "STOP requested: damping is sent, a console in control may go on commanding",
-        false => "STOP: damping",
+    let text = match (model.session.info.observe, dropped) {
+        (true, _) => "STOP requested: damping is sent, a console in control may go on commanding",
+        (false, true) => "STOP: damping. The form was closed, its values are not applied",
+        (false, false) => "STOP: damping",
     };
     say_stop(model, text);
     vec![Effect::Stop]

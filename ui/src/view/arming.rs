@@ -133,7 +133,7 @@ pub fn summary(model: &Model) -> String {
         (false, count) => format!("{count} of {needed} not yet"),
     };
     match model.arming_checks_are_past() {
-        true => format!("checked at {}: {result}", wall_clock(session, session.arming_checked_ns)),
+        true => format!("checked at {}: {result}", wall_clock(model, session.arming_checked_ns)),
         false => result,
     }
 }

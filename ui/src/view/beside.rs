@@ -4,7 +4,7 @@ use quadfrog::trial::TrialRecord;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
-use ratatui::widgets::{Paragraph, Wrap};
+use ratatui::widgets::Paragraph;
 
 use super::draw::{heading, number, sign, span};
 use crate::column::Column;
@@ -13,6 +13,7 @@ use crate::model::Model;
 use crate::model::comparison::Comparison;
 use crate::model::trials::measured;
 use crate::theme::Role;
+use crate::wrap::wrap_all;
 
 /// Measured values with their labels.
 const MEASURED: [(Column, &str); 5] = [
@@ -79,15 +80,19 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         let unit = model.session.parameter(name).map_or(String::new(), |info| info.unit);
         lines.push(line(&format!("{name} {unit}"), both(&|_, row| value(row.parameters.get(name)))));
     }
-    for (column, label) in MEASURED {
+    let cause = |(name, trial): (&str, &ComparedTrial)| {
+        let cause = trial.row.as_ref().map(|row| row.cause.clone()).filter(|cause| !cause.is_empty())?;
+        Some(Line::from(span(theme, Role::Quiet, format!(" {name}: {cause}"))))
+    };
+    let causes: Vec<Line> = [("A", a), ("B", b)].into_iter().filter_map(cause).collect();
+    let causes = wrap_all(&causes, usize::from(body.width), 4);
+    // In a low panel measured values give way to the causes of both verdicts.
+    let room = usize::from(body.height).saturating_sub(lines.len() + causes.len());
+    for (column, label) in MEASURED.into_iter().take(room) {
         lines.push(line(label, both(&|_, row| signed(measured(row, column)))));
     }
-    for (name, trial) in [("A", a), ("B", b)] {
-        if let Some(row) = trial.row.as_ref().filter(|row| !row.cause.is_empty()) {
-            lines.push(Line::from(span(theme, Role::Quiet, format!(" {name}: {}", row.cause))));
-        }
-    }
-    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), body);
+    lines.extend(causes);
+    frame.render_widget(Paragraph::new(lines), body);
 }
 
 /// The verdict, or else the suggested one with a question mark.

@@ -179,28 +179,34 @@ impl Chart<'_> {
             (at_trial_time(ghost.trace, time_s as f32), ghost.role)
         });
         let unit = self.style.series.unit();
-        let mut pieces = vec![(format!("{}{contact} ", self.style.series.name()), self.style.role)];
         let width = usize::from(area.width);
-        match ghost {
+        // From the longest form to the shortest.
+        let (forms, role_b) = match ghost {
             Some((other, role)) => {
                 let other = |decimals| other.map_or("-".to_owned(), |sample| self.number(sample, decimals));
-                // The longest form for which there is room.
-                let forms = [
-                    (format!("A {} ", value(3)), format!("B {} {unit}", other(3))),
-                    (format!("A {} ", value(3)), format!("B {}", other(3))),
-                    (value(3), format!("/{}", other(3))),
-                    (value(2), format!("/{}", other(2))),
-                ];
-                let room = width.saturating_sub(pieces[0].0.chars().count());
-                let fits = |form: &&(String, String)| form.0.chars().count() + form.1.chars().count() <= room;
-                let (a, b) = forms.iter().find(fits).unwrap_or(&forms[3]).clone();
-                pieces.extend([(a, Role::Text), (b, role)]);
+                let named = [format!("B {} {unit}", other(3)), format!("B {}", other(3))];
+                let named = named.map(|b| (format!("A {} ", value(3)), b));
+                let short = [3, 2, 1].map(|decimals| (value(decimals), format!("/{}", other(decimals))));
+                ([&named[..], &short[..]].concat(), role)
             }
-            None => pieces.push((format!("{} {unit}", value(3)), Role::Text)),
-        }
+            None => {
+                let with_unit = (format!("{} {unit}", value(3)), String::new());
+                let short = [3, 2, 1].map(|decimals| (value(decimals), String::new()));
+                ([&[with_unit][..], &short[..]].concat(), Role::Text)
+            }
+        };
+        // A number is never cut; the quantity of a joint gives way before it.
+        let name = self.style.series.name();
+        let joint = name.split(' ').next().filter(|joint| joint.contains('_')).unwrap_or(name);
+        let names = [name, joint].map(|name| format!("{name}{contact} "));
+        let columns = |text: &str| text.chars().count();
+        let fits = |name: &str, (a, b): &(String, String)| columns(name) + columns(a) + columns(b) <= width;
+        let found = names.iter().find_map(|name| Some((name, forms.iter().find(|form| fits(name, form))?)));
+        let (name, (a, b)) = found.unwrap_or((&names[1], &forms[forms.len() - 1]));
+        let pieces = [(name, self.style.role), (a, Role::Text), (b, role_b)];
         let mut used = 0;
         for (text, role) in pieces {
-            let text = truncate(&text, width - used);
+            let text = truncate(text, width - used);
             buffer.set_string(area.x + used as u16, area.y, &text, theme.style(role));
             used += text.chars().count();
         }

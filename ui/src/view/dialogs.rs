@@ -256,7 +256,7 @@ fn field(
             let allowed = searched.map_or(String::new(), |p| {
                 format!("; safety.toml allows {} to {}", six_digits(p.least), six_digits(p.most))
             });
-            format!("write it as 50..120{allowed}; past trials stay")
+            format!("write it as 50..120 or 50,120, without a space{allowed}; past trials stay")
         }
         Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
         Purpose::ConfirmBest => {
@@ -323,6 +323,9 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
             end_of_selected = lines.len();
         }
     }
+    if lines.is_empty() {
+        lines.push(Line::from(span(theme, Role::Quiet, "no action matches")));
+    }
     // The selected action stays in sight.
     let first = end_of_selected.saturating_sub(usize::from(list.height));
     frame.render_widget(Paragraph::new(lines.into_iter().skip(first).collect::<Vec<_>>()), list);
@@ -336,9 +339,14 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     };
     let rows = model.choices(subject);
     let name_width = rows.iter().map(|(name, ..)| name.chars().count()).max().unwrap_or_default().max(11);
-    let inner = open_box(frame, area, model, title, 66, rows.len() as u16 + 2);
     // A terminal that is too low shows the lines around the chosen one.
-    let first = (selected + 1).saturating_sub(usize::from(inner.height));
+    let room = usize::from(area.height.saturating_sub(2)).min(rows.len());
+    let first = (selected + 1).saturating_sub(room);
+    let title = match rows.len() > room {
+        true => format!("{title} ({}-{} of {}, Up Down)", first + 1, first + room, rows.len()),
+        false => title.to_owned(),
+    };
+    let inner = open_box(frame, area, model, &title, 66, rows.len() as u16 + 2);
     for (line, (index, (name, help, on))) in
         rows.iter().enumerate().skip(first).take(usize::from(inner.height)).enumerate()
     {

@@ -9,7 +9,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use crate::model::session::SessionModel;
+use crate::model::Model;
 use crate::theme::{Role, Theme};
 
 pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
@@ -68,11 +68,13 @@ pub fn clock(time_ns: u64) -> String {
     if h > 0 { format!("{h}:{m:02}:{s:02}") } else { format!("{m:02}:{s:02}") }
 }
 
-/// The time of day, `14:03:12`, of a time in ns since the session began, in the time zone of the system; without a known
-/// begin the time since then.
-pub fn wall_clock(session: &SessionModel, time_ns: u64) -> String {
-    let begun = session.info.started.parse::<Timestamp>().ok();
-    let at = begun.and_then(|begun| begun.checked_add(Duration::from_nanos(time_ns)).ok());
+/// The time of day, `14:03:12`, of a time in ns since the session began, in the time zone of the system; in a replay by the
+/// clock of the session that recorded it. Without a known begin the time since then.
+pub fn wall_clock(model: &Model, time_ns: u64) -> String {
+    let recorded = model.timeline.as_ref().and_then(|timeline| timeline.utc_ns(time_ns));
+    let recorded = recorded.and_then(|utc_ns| Timestamp::from_nanosecond(utc_ns.into()).ok());
+    let begun = || model.session.info.started.parse::<Timestamp>().ok();
+    let at = recorded.or_else(|| begun()?.checked_add(Duration::from_nanos(time_ns)).ok());
     at.map_or_else(|| clock(time_ns), |at| at.to_zoned(TimeZone::system()).strftime("%H:%M:%S").to_string())
 }
 

@@ -262,8 +262,11 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
         }
         None => rows.push(row("link", "SIM: no link".to_owned(), false)),
     }
-    rows.push(detail("robot clock", format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3), false));
-    match tick.state.battery {
+    // What a silent robot has sent last is no value of now.
+    let heard = !model.robot_is_silent();
+    let clock = if heard { format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3) } else { "-".to_owned() };
+    rows.push(detail("robot clock", clock, false));
+    match tick.state.battery.filter(|_| heard) {
         Some(battery) => {
             let cells: Vec<f64> = battery.cell_v.into_iter().filter(|v| *v > 0.0).collect();
             let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
@@ -275,7 +278,7 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
                 rows.push(row("cells", format!("{low:.3} to {high:.3} V",), high - low > 0.1));
             }
         }
-        None if model.robot_is_silent() => rows.push(row("battery", "-".to_owned(), false)),
+        None if !heard => rows.push(row("battery", "-".to_owned(), false)),
         None => rows.push(row("battery", "none".to_owned(), false)),
     }
     rows

@@ -38,7 +38,8 @@ pub fn whole_line(model: &Model, width: usize) -> Option<Vec<Line<'static>>> {
         LogLevel::Warning => ("warning", Role::Warning),
         LogLevel::Info => ("information", Role::Text),
     };
-    let times = format!("{}, {} after the start", wall_clock(&model.session, line.time_ns), session_time(line));
+    let of = if model.replay.is_some() { "of the replay" } else { "after the start" };
+    let times = format!("{}, {} {of}", wall_clock(model, line.time_ns), session_time(line));
     let head = vec![
         Line::from(vec![span(theme, Role::Quiet, "time    "), Span::raw(times)]),
         Line::from(vec![span(theme, Role::Quiet, "level   "), span(theme, level.1, level.0)]),
@@ -74,7 +75,7 @@ fn line_of(model: &Model, line: &LogLine, selected: bool, width: usize) -> Line<
     let theme = &model.theme;
     let mut time = String::new();
     if width >= BOTH_TIMES_FROM || model.replay.is_none() {
-        time = format!("{:<9}", wall_clock(&model.session, line.time_ns));
+        time = format!("{:<9}", wall_clock(model, line.time_ns));
     }
     if width >= BOTH_TIMES_FROM || model.replay.is_some() {
         time += &format!("{:>10} ", session_time(line));

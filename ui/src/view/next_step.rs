@@ -10,7 +10,8 @@ use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate};
 use crate::action::Action;
-use crate::legal::legal;
+use crate::legal::{legal, may_request, waiting_trial_is_meant};
+use crate::message::ReplayStatus;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Question};
 use crate::theme::Role;
@@ -161,6 +162,11 @@ fn observers_stop(model: &Model) -> NextStep {
 
 fn review(model: &Model) -> NextStep {
     let suggested = model.session.under_review().and_then(|trial| trial.suggested);
+    if let (Err(_), Some(waiting)) = (waiting_trial_is_meant(model), model.session.under_review()) {
+        let live = model.keymap.key(Action::LiveView);
+        let lead = format!("Trial {} waits for its verdict: select its row or press {live}.", waiting.trial);
+        return step(lead, model, &[(Action::SitDown, "sit down"), (Action::Quit, "quit")]);
+    }
     let verdicts = [(Action::Accept, Verdict::Accept), (Action::Fall, Verdict::Fall), (Action::Void, Verdict::Void)];
     let (first, others): (Vec<_>, Vec<_>) = verdicts.into_iter().partition(|(_, verdict)| Some(*verdict) == suggested);
     let lead = match first.first() {
@@ -170,24 +176,46 @@ fn review(model: &Model) -> NextStep {
         None => "Judge it".to_owned(),
     };
     let mut others: Vec<_> = others.into_iter().map(|(action, verdict)| (action, verdict.name())).collect();
-    others.extend([(Action::Rerun, "re-run"), (Action::HandValue, "value by hand"), (Action::Note, "note")]);
+    if suggested == Some(Verdict::Void) {
+        // As after a cancelled countdown: void alone gives the point up.
+        others.insert(0, (Action::Rerun, "re-run of this point"));
+    } else {
+        others.push((Action::Rerun, "re-run"));
+    }
+    others.extend([(Action::HandValue, "value by hand"), (Action::Note, "note")]);
     step(lead, model, &others)
 }
 
+/// The age of what a followed recording shows, if it is old, and the key to the present.
+fn behind(model: &Model) -> Option<String> {
+    let replay = model.replay.as_ref()?;
+    let old_s = replay.old_ns()? as f64 / 1e9;
+    let end = model.keymap.key(Action::ReplayEnd);
+    Some(match replay.later_is_known() {
+        true => format!("Behind by {old_s:.0} s: {end} shows the present."),
+        false => format!("Nothing new for {old_s:.0} s."),
+    })
+}
+
 fn replay(model: &Model) -> NextStep {
+    let old = behind(model);
     if let Some(observer) = model.observer() {
-        let lead = match observer.ended {
-            true => "The session has ended. STOP does not reach its robot any longer.",
-            false => "Watching, about 1 s behind. STOP reaches the robot of this session at once.",
+        let lead = match (observer.ended, old) {
+            (true, _) => "The session has ended. STOP does not reach its robot any longer.".to_owned(),
+            (false, Some(old)) => format!("{old} STOP reaches its robot at once."),
+            (false, None) => "Watching, about 1 s behind. STOP reaches the robot of this session at once.".to_owned(),
         };
         return step(
             lead,
             model,
-            &[(Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest"), (Action::Quit, "quit")],
+            &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest")],
         );
     }
     let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
     let key = model.keymap.key(Action::PlayPause);
+    if let Some(old) = old.filter(|_| model.replay.as_ref().is_some_and(ReplayStatus::later_is_known)) {
+        return step(old, model, &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play")]);
+    }
     step(
         format!("{key} {}", if playing { "pauses" } else { "plays" }),
         model,
@@ -205,7 +233,19 @@ fn replay(model: &Model) -> NextStep {
     )
 }
 
+/// The step of an open dialog. A stopped robot comes before what the dialog asks.
 fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
+    let step = of_dialog(model, dialog);
+    if !model.stop_requested() || legal(Action::Acknowledge, model).is_err() {
+        return step;
+    }
+    let stopped = if model.mode() == Mode::Fault { "FAULT" } else { "STOPPED" };
+    let acknowledge = model.keymap.key(Action::Acknowledge);
+    let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
+    NextStep { lead: format!("{stopped}: {way}{acknowledge} acknowledges. {}", step.lead), ..step }
+}
+
+fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let key = |action| model.keymap.key(action);
     let lead = match dialog {
         Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
@@ -253,8 +293,9 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
         Dialog::Queue { .. } if model.session.queue().is_empty() => "Enter closes.".to_owned(),
+        Dialog::Queue { .. } if may_request(model).is_err() => "Up Down choose, Enter closes.".to_owned(),
         Dialog::Queue { .. } => "Up Down choose, Left earlier, Right later, x removes, Enter closes.".to_owned(),
-        Dialog::Report { .. } | Dialog::Help { .. } => "Up Down scroll, any other key closes.".to_owned(),
+        Dialog::Report { .. } | Dialog::Help { .. } => "Up Down PgUp PgDn scroll, any other key closes.".to_owned(),
         Dialog::Details { .. } => "Up Down other trials, PgUp PgDn scroll, Esc closes.".to_owned(),
         Dialog::LogLine { .. } => "Up Down other lines, PgUp PgDn scroll, any other key closes.".to_owned(),
     };

@@ -18,9 +18,6 @@ use crate::theme::Role;
 /// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
 
-/// Time without growth from which a followed recording counts as old, ns: it grows every second.
-const SILENT_NS: u64 = 2_500_000_000;
-
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let [first, second] = Layout::vertical([Constraint::Length(1); 2]).areas(area);
     let recording = Line::from(recording(model));
@@ -141,11 +138,8 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         ],
         false => vec![span(theme, Role::Quiet, " recorded: no robot to stop")],
     };
-    let gap = if narrow { "  " } else { "   " };
-    let mut part = |name: &str, role, value: String| {
-        spans.push(span(theme, Role::Quiet, format!("{gap}{name}")));
-        spans.push(span(theme, role, value));
-    };
+    let mut parts: Vec<(&str, Role, String)> = Vec::new();
+    let mut part = |name, role, value: String| parts.push((name, role, value));
     let snapshot = &model.snapshot;
     let counters = &snapshot.counters;
     let limits = &model.session.info.limits;
@@ -168,17 +162,25 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
             part("link ", role, format!("{} ms, {loss:.1} % lost", link.state_age_ms));
         }
     }
+    // What a silent robot has sent last is no value of now.
+    let silent = model.robot_is_silent();
     let temperatures = snapshot.tick.state.motor_temperature_c;
     let hottest = temperatures.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, hottest)) = hottest.filter(|(_, hottest)| *hottest > 0.0) {
         let joint = if narrow { String::new() } else { format!(" {}", joint_name(joint)) };
         let name = if narrow { "motor " } else { "hottest " };
-        part(name, bad(hottest >= limits.motor_c), format!("{hottest:.0} C{joint}"));
+        match silent {
+            true => part(name, Role::Quiet, "-".to_owned()),
+            false => part(name, bad(hottest >= limits.motor_c), format!("{hottest:.0} C{joint}")),
+        }
     }
     if let Some(battery) = snapshot.tick.state.battery {
         let charge = battery.charge_percent;
         let name = if narrow { "bat " } else { "battery " };
-        part(name, bad(charge < limits.battery_percent), format!("{charge:.0} %"));
+        match silent {
+            true => part(name, Role::Quiet, "-".to_owned()),
+            false => part(name, bad(charge < limits.battery_percent), format!("{charge:.0} %")),
+        }
     }
     if let Some(replay) = &model.replay {
         if replay.lost_ns > 0 {
@@ -187,9 +189,16 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         if let Some(trial) = replay.looping {
             part("", Role::Warning, format!("LOOP #{trial}"));
         }
-        for (shown, text) in [(replay.slow_motion, "SLOW JUMPS"), (replay.silent_ns.is_some(), "FOLLOWING")] {
+        for (shown, text) in [(replay.slow_motion, "SLOW JUMPS"), (replay.shows_present(), "FOLLOWING")] {
             if shown {
                 part("", Role::Warning, text.to_owned());
+            }
+        }
+        if let Some(old_ns) = replay.old_ns() {
+            let old_s = old_ns as f64 / 1e9;
+            match replay.later_is_known() {
+                true => part("", Role::Bad, format!("OLD: {old_s:.0} s behind")),
+                false => part("", Role::Bad, format!("OLD: nothing new for {old_s:.0} s")),
             }
         }
     }
@@ -197,13 +206,24 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         Some(observer) if observer.demanded > observer.stopped => part("", Role::Bad, "STOP NOT CONFIRMED".to_owned()),
         _ => {}
     }
-    let silent_ns = model.replay.as_ref().and_then(|replay| replay.silent_ns).filter(|ns| *ns > SILENT_NS);
-    if let Some(silent_ns) = silent_ns.filter(|_| model.observer().is_none_or(|observer| !observer.ended)) {
-        part("", Role::Bad, format!("OLD: nothing new for {:.0} s", silent_ns as f64 / 1e9));
-    }
     let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
     if age_ms > STALE_MS && model.replay.is_none() {
         part("", Role::Bad, format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3));
+    }
+    let gap = if narrow { "  " } else { "   " };
+    let room = usize::from(width).saturating_sub(spans.iter().map(Span::width).sum());
+    let columns = |parts: &[(&str, Role, String)]| -> usize {
+        parts.iter().map(|(name, _, value)| gap.len() + name.len() + value.chars().count()).sum()
+    };
+    // Where there is no room for all, the values in order give way, each whole, and the warnings stay.
+    while columns(&parts) > room {
+        let in_order = |(_, role, _): &(&str, Role, String)| matches!(role, Role::Text | Role::Quiet);
+        let Some(first) = parts.iter().position(in_order) else { break };
+        parts.remove(first);
+    }
+    for (name, role, value) in parts {
+        spans.push(span(theme, Role::Quiet, format!("{gap}{name}")));
+        spans.push(span(theme, role, value));
     }
     spans
 }
@@ -249,7 +269,7 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
 
 /// Draws the newest answer to the operator; one with more rows than the area ends with the mark of a cut.
 pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
-    let Some(message) = &model.message else { return };
+    let Some(message) = model.shown_message() else { return };
     let role = match message.level {
         LogLevel::Info | LogLevel::Warning if message.is_old(model.clock) => Role::Quiet,
         LogLevel::Info => Role::Text,

@@ -55,6 +55,18 @@ fn summary(model: &Model) -> String {
     format!("{counts}; by {sort}{turned} ({by}), {shown} ({only}), columns ({columns})")
 }
 
+/// Columns of the longest source in the table.
+fn source_width(model: &Model) -> usize {
+    let rows = model.session.trials.records.values().chain(model.later_trials());
+    rows.map(|row| source(row).chars().count()).fold(9, usize::max)
+}
+
+/// The source of a trial's parameters, with the trial that it repeats.
+fn source(trial: &TrialRecord) -> String {
+    let parent = trial.parent.map_or(String::new(), |parent| format!(" {parent}"));
+    format!("{}{parent}", trial.source.name())
+}
+
 struct ShownColumn {
     title: String,
     width: usize,
@@ -88,7 +100,7 @@ fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
             Column::Air => (format!("{:>7}", "air s"), 7),
             Column::Value => (format!("{:>8}", format!("J {}", model.session.info.unit)), 9),
             Column::Verdict => ("  verdict".to_owned(), 10),
-            Column::Source => ("source".to_owned(), 9),
+            Column::Source => ("source".to_owned(), source_width(model)),
             Column::Risk => ("fell".to_owned(), 4),
             Column::Time => ("   ran".to_owned(), 7),
             Column::Cause => ("cause, note".to_owned(), usize::MAX),
@@ -244,10 +256,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             };
             (format!("{symbol} {verdict:<7}{}", if best { "*" } else { " " }), role)
         }
-        Column::Source => {
-            let parent = trial.parent.map_or(String::new(), |parent| format!(" {parent}"));
-            (format!("{}{parent}", trial.source.name()), Role::Quiet)
-        }
+        Column::Source => (source(trial), Role::Quiet),
         Column::Risk => {
             let risk = trial.risk.filter(|risk| risk.neighbours > 0);
             (risk.map_or("-".to_owned(), |risk| format!("{}/{}", risk.falls, risk.neighbours)), Role::Quiet)

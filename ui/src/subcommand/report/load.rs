@@ -10,7 +10,7 @@ use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::session::experiment::rows_of;
+use quadfrog::session::experiment::{confirmation_in_words, rows_of};
 use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
@@ -95,6 +95,7 @@ fn reported(
         parameters: opened.parameters.clone(),
         rows,
         best: study.best().map(|best| best.number),
+        confirmation: ours.and_then(|_| confirmation_in_words(study)),
         model_best: study.model_best().map(|best| PredictedTrial {
             trial: best.trial,
             value: best.predicted,

@@ -1,6 +1,7 @@
 //! Keys of the form that changes a proposal.
 
 use crossterm::event::KeyCode;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 
 use super::text_field::{NOT_OF_A_NUMBER, edit};
@@ -9,7 +10,7 @@ use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
-use crate::update::request::{cancelled, request};
+use crate::update::request::{cancelled, request, say};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
@@ -65,7 +66,8 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             let changed = form.rows.iter().filter(|row| row.value != row.before);
             let requests: Vec<OperatorRequest> = changed.map(override_request).collect();
             if requests.is_empty() {
-                return cancelled(model, "nothing was changed");
+                say(model, LogLevel::Info, "no value was changed: the proposal stays as it is");
+                return Vec::new();
             }
             return requests.into_iter().flat_map(|each| request(model, each)).collect();
         }
