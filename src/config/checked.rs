@@ -82,9 +82,6 @@ impl Config {
                 let path = folder.join(name);
                 if path.exists() {
                     let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
-                    if text.is_empty() {
-                        return Err(ConfigError::Empty { path });
-                    }
                     texts.push((name.to_owned(), path.display().to_string(), text));
                 }
             }

@@ -30,7 +30,10 @@ pub enum ConfigError {
     UnknownFile { path: PathBuf, known: String },
     #[error("{}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{}: is empty, as after a full disk; remove it, or write the keys that differ into it", path.display())]
+    #[error(
+        "{}: is empty, as after a full disk, so it is not known what the study ran with; give its configuration with --config",
+        path.display()
+    )]
     Empty { path: PathBuf },
     #[error("{}: exists already; give a new folder, or remove the file first", path.display())]
     Exists { path: PathBuf },

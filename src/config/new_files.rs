@@ -23,16 +23,15 @@ pub fn write_new_files<T: AsRef<Path>, U: AsRef<str>>(
     if folder.is_dir() {
         for (written, (path, (_, text))) in paths.iter().zip(files).enumerate() {
             write_new_file(path, text.as_ref()).map_err(|source| {
-                paths[..=written].iter().for_each(|path| drop(fs::remove_file(path)));
+                paths[..written].iter().for_each(|path| drop(fs::remove_file(path)));
                 failed(path, source)
             })?;
         }
     } else {
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        let part = folder.with_file_name(format!(".{name}.part"));
+        // Another program may make the same folder at the same time: the first one's stands.
+        let part = folder.with_file_name(format!(".{name}.{}.part", std::process::id()));
         let write = || {
-            // Of a program that was killed here.
-            let _ = fs::remove_dir_all(&part);
             for (name, text) in files {
                 write_new_file(&part.join(name), text.as_ref())?;
             }
@@ -50,11 +49,16 @@ pub fn write_new_files<T: AsRef<Path>, U: AsRef<str>>(
     Ok(paths)
 }
 
+/// Writes a file that does not exist; of one that cannot be written whole nothing stays.
 fn write_new_file(path: &Path, text: &str) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
     }
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
+    let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
+    if written.is_err() {
+        // The error that is reported is that of the writing.
+        let _ = fs::remove_file(path);
+    }
+    written
 }

@@ -140,6 +140,19 @@ pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
     entries.filter_map(|entry| numbered(entry.ok()?.path())).max_by_key(|(number, _)| *number)
 }
 
+/// Refuses a kept configuration with an empty file: it was whole when its study ran.
+///
+/// # Errors
+/// [`ConfigError::Empty`].
+pub fn check_kept_config(config: &Path) -> Result<(), ConfigError> {
+    let files = std::fs::read_dir(config).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let is_empty = |path: &PathBuf| path.metadata().is_ok_and(|about| about.is_file() && about.len() == 0);
+    files
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .find(is_empty)
+        .map_or(Ok(()), |path| Err(ConfigError::Empty { path }))
+}
+
 /// Returns the study files of `folder` and of the folders in it, in the order of their names.
 pub fn study_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let own = folder.join(STUDY_FILE);

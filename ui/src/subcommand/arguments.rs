@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
-use quadfrog::engine::{Provenance, newest_config};
+use quadfrog::engine::{Provenance, check_kept_config, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::Network;
@@ -238,6 +238,7 @@ impl StudyArguments {
     pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<Config, Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
+            check_kept_config(own)?;
             notice!("continuing with the last configuration of the study, {}", own.display());
         }
         let mut config = load_config_for(robot, self.config.as_deref().or(own.as_deref()))?;
