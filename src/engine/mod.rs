@@ -171,11 +171,11 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     })
 }
 
+/// A robot, and the guard of a real one.
+type GuardedRobot = (Box<dyn Robot>, Option<(Guard, GuardHeartbeat)>);
+
 /// Returns the simulated robot, or the real one with its guard.
-fn open_robot_and_guard(
-    options: &Options,
-    settings: &ControlSettings,
-) -> Result<(Box<dyn Robot>, Option<(Guard, GuardHeartbeat)>), EngineError> {
+fn open_robot_and_guard(options: &Options, settings: &ControlSettings) -> Result<GuardedRobot, EngineError> {
     match options.backend {
         Backend::Simulator => Ok((Box::new(Simulator::new(&options.robot, &options.config.simulator)?), None)),
         Backend::Hardware => {

@@ -210,6 +210,8 @@ fn a_console_session_says_that_the_next_file_could_not_be_begun() {
     let mut session = Session::start(program.path("").as_path(), (160, 40), &arguments);
     session.send("6");
     session.wait_for_long("the cause", || session.screen().contains("could not be begun or completed"));
+    // A jump that was approved in the same moment runs to its end; the next one is refused.
+    session.wait_for_long("the refusal", || session.screen().contains("auto waits for a person"));
     assert!(!session.screen().contains("nothing is recorded"), "{}", session.screen());
     session.send("qy");
     session.wait_for(&["the recording is not complete"]);
