@@ -423,6 +423,36 @@ fn an_approval_is_single_use_expires_and_dies_with_a_change_of_mode() {
     assert_eq!(bench.cycle.mode(), Mode::Countdown);
 }
 
+/// Regression: an approval that was refused because the robot had moved began a jump when it arrived again half a second later.
+#[test]
+fn a_permit_that_was_refused_is_used_up() {
+    let mut bench = linked().reach(Mode::Ready);
+    bench.robot.tamper = |state| state.imu.gyro_body.z = 0.5;
+    bench.ticks(10);
+    bench.robot.tamper = |_| {};
+    let approval = bench.approved();
+    bench.command(approval);
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Inhibited(_))), "{:?}", bench.refusal());
+    bench.settle();
+    bench.command(approval);
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Answered)));
+    bench.command(bench.approved());
+    assert_eq!(bench.cycle.mode(), Mode::Countdown);
+
+    let mut bench = linked().reach(Mode::Disarmed);
+    bench.robot.tamper = |state| state.battery = None;
+    bench.ticks(10);
+    let arm = bench.arm();
+    bench.command(arm);
+    assert!(matches!(bench.refusal(), Some(CommandRefusal::Checks(_))), "{:?}", bench.refusal());
+    bench.robot.tamper = |_| {};
+    bench.ticks(1500);
+    bench.command(arm);
+    assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Disarmed, Some(CommandRefusal::Answered)));
+    bench.command(bench.arm());
+    assert_eq!(bench.cycle.mode(), Mode::StandUp);
+}
+
 /// Regression: arming did not expire, and needed no heartbeat of the operator's console.
 #[test]
 fn arming_expires_dies_with_a_change_of_mode_and_needs_somebody_who_watches() {
@@ -565,7 +595,7 @@ enum Step {
     Nothing,
     Plain(Command),
     FreshApproval,
-    /// The newest approval that was given before, again.
+    /// The first approval that was given before, again.
     OldApproval,
     Stop,
     Silence,

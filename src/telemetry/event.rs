@@ -66,6 +66,8 @@ pub enum CommandRefusal {
     Leaving,
     #[error("sit down or cancel was pressed after it; check the robot and press again")]
     Lowered,
+    #[error("this key press was answered before; check the robot and press again")]
+    Answered,
 }
 
 /// Conditions of the next arming and the next trial.

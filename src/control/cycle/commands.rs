@@ -39,7 +39,11 @@ impl Cycle {
             self.sits_down_after.get_or_insert(TransitionCause::Command);
             return;
         }
-        if let Some(because) = self.refusal(command, trigger, inputs) {
+        let refusal = self.refusal(command, trigger, inputs);
+        if let Command::Arm(permit) | Command::RunTrial(_, permit) = command {
+            self.answered_permit_ns = self.answered_permit_ns.max(Some(permit.given_ns));
+        }
+        if let Some(because) = refusal {
             self.events.push(Event::Refused { command: *command, mode: self.mode, because });
             return;
         }
@@ -118,7 +122,8 @@ impl Cycle {
         }
     }
 
-    /// Refuses a permit that is older than a change of mode or a command to sit down or to cancel, or too old.
+    /// Refuses a permit that is older than a change of mode, a command to sit down or to cancel or another permit, or too old. One
+    /// that was refused is used up: the robot must not move later for a key press that was answered with no.
     fn permit_expired(&self, Permit { mode_changes, given_ns }: Permit, inputs: &TickInputs) -> Option<CommandRefusal> {
         let age_s = inputs.time_ns.saturating_sub(given_ns) as f64 * 1e-9;
         let allowed_s = self.settings.approval.expires_s;
@@ -128,6 +133,8 @@ impl Cycle {
             Some(CommandRefusal::Stale)
         } else if given_ns < self.lowered_ns {
             Some(CommandRefusal::Lowered)
+        } else if Some(given_ns) <= self.answered_permit_ns {
+            Some(CommandRefusal::Answered)
         } else if age_s > allowed_s {
             Some(CommandRefusal::Expired { age_s, allowed_s })
         } else {

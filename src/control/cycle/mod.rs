@@ -121,6 +121,8 @@ pub struct Cycle {
     sits_down_after: Option<TransitionCause>,
     /// Time of the newest command to sit down or to cancel, ns: a permit from before it is void.
     lowered_ns: u64,
+    /// Time of the newest permit that was granted or refused, ns: it holds once.
+    answered_permit_ns: Option<u64>,
     tick: Tick,
     events: Events,
 }
@@ -159,6 +161,7 @@ impl Cycle {
             dropped: None,
             sits_down_after: None,
             lowered_ns: 0,
+            answered_permit_ns: None,
             tick: Tick::default(),
             events: Events::default(),
         }
