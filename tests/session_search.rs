@@ -468,6 +468,9 @@ fn an_override_stays_with_its_queued_point() {
     experiment.set_parameter("Fz", 200.0).unwrap();
     experiment.remove_queued(0).unwrap();
     assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, Vec::new()));
+    // Its row still says which point it was.
+    let removed = experiment.rows().find(|row| row.trial == 0).unwrap();
+    assert_eq!(removed.parameters.get("Fx"), Some(30.0));
 }
 
 /// A journal that ends at any byte of a change, as that of a killed program may: each point waits once, or is removed.

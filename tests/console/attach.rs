@@ -53,11 +53,14 @@ impl Lab {
         command.output().unwrap()
     }
 
-    /// The lines of `quadfrog sessions`.
+    /// The lines of `quadfrog sessions` below their heading.
     fn listed(&self) -> Vec<String> {
         let output = self.command(&["sessions"]);
         assert!(output.status.success());
-        String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
+        let text = String::from_utf8(output.stdout).unwrap();
+        let mut lines = text.lines().map(str::to_owned);
+        assert!(lines.next().is_none_or(|heading| heading.starts_with("process  robot")), "{text}");
+        lines.collect()
     }
 
     fn sockets(&self) -> Vec<PathBuf> {
@@ -76,7 +79,7 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     let mut session = lab.session("studies", &[]);
     let listed = lab.listed();
     assert_eq!(listed.len(), 1, "{listed:?}");
-    for part in [" sim go1 ", " forward ", " Ada, since 2", "-forward-seed"] {
+    for part in [" sim go1 ", " forward ", " Ada  ", "-forward-seed"] {
         assert!(listed[0].contains(part), "{listed:?}");
     }
     session.send("A");

@@ -31,6 +31,10 @@ fn studies_are_listed_and_shown() {
     assert!(line.contains("forward") && line.contains(" m"), "{list}");
     let name = Path::new(&study).file_name().unwrap().to_str().unwrap();
     assert!(line.contains(name), "{list}");
+    let cells: Vec<&str> = line.split_whitespace().collect();
+    let falls = program.exported(&study).iter().filter(|row| row["user_attrs"]["verdict"] == "fall").count().to_string();
+    // Seed, trials, those that count (without a person none is void), falls.
+    assert_eq!(cells[2..6], ["0", "6", "6", &falls], "{list}");
     let show = program.text(&["study", "show", &study]);
     assert!(
         show.contains("forward-seed0") && show.contains("robot: go1") && show.contains("Fz from 150 to 350 N"),

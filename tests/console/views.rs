@@ -392,8 +392,10 @@ fn a_row_is_copied_and_the_table_is_written_as_shown() {
     assert!(lines[0].starts_with("trial,f0,Fx,Fz,value") && lines[1].starts_with("1,1.25,75,250,0,"), "{csv}");
     let columns = |line: &str| line.split(',').count();
     assert!(lines.iter().all(|line| columns(line) == columns(lines[0])), "{csv}");
+    assert!(lines[0].ends_with(",jumps"), "{csv}");
     let markdown = text::as_markdown(&console.model, ExportedRows::Shown);
     assert!(markdown.starts_with("| trial | f0 |") && markdown.lines().nth(1).is_some_and(|l| l.contains(" --- |")));
+    assert!(!markdown.contains("jumps") && !markdown.contains('{'), "no column of JSON: {markdown}");
 }
 
 #[test]

@@ -21,11 +21,8 @@ pub fn remark(trial: &TrialRecord) -> String {
     }
 }
 
-/// Width of the tables of a study in the console, characters.
-const REPORT_WIDTH: usize = 74;
-
-/// Returns the tables of the session's study as lines, as `quadfrog report` prints them.
-pub fn report(session: &SessionModel) -> Vec<String> {
+/// Returns the tables of the session's study as lines of at most `width` characters, as `quadfrog report` prints them.
+pub fn report(session: &SessionModel, width: usize) -> Vec<String> {
     let info = &session.info;
     let rows: Vec<TrialRecord> = session.trials.records.values().cloned().collect();
     let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len()).max();
@@ -50,7 +47,7 @@ pub fn report(session: &SessionModel) -> Vec<String> {
         configuration: Vec::new(),
         rows,
     };
-    text::render(&study_page::summary(&study), REPORT_WIDTH).lines().map(str::to_owned).collect()
+    text::render(&study_page::summary(&study), width).lines().map(str::to_owned).collect()
 }
 
 /// A trial as one line of text, for the clipboard.
@@ -116,9 +113,12 @@ pub fn as_csv(model: &Model, rows: ExportedRows) -> String {
     std::iter::once(&names).chain(&rows).map(line).collect()
 }
 
-/// The table as a Markdown table, for reading: numbers with six digits.
+/// The table as a Markdown table, for reading: numbers with six digits, without the last column, which is JSON.
 pub fn as_markdown(model: &Model, rows: ExportedRows) -> String {
-    let (names, rows) = export_cells(model, rows, six_digits);
+    let (mut names, mut rows) = export_cells(model, rows, six_digits);
+    for cells in rows.iter_mut().chain([&mut names]) {
+        cells.pop();
+    }
     let line = |cells: &Vec<String>| {
         let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|").replace('\n', " ")).collect();
         format!("| {} |\n", cells.join(" | "))

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::plan::ExperimentPlan;
 use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
-use crate::optimize::trial::{Trial, TrialState};
+use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
     Backend, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal,
     ProposalSource, RepeatRecord, Task, TrialRecord, Verdict,
@@ -369,12 +369,15 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         TrialState::Fail | TrialState::Pruned => Some(Verdict::Void),
         TrialState::Running | TrialState::Waiting => None,
     };
+    // A point that was removed from the queue was never begun: it has the values that were given.
+    let given = trial.fixed();
+    let parameter = |name: &str| trial.parameter(name).or_else(|| value_of(&given, name));
     let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
     TrialRecord {
         trial: trial.number,
         source: if elsewhere && trial.state != TrialState::Waiting { ProposalSource::OtherProgram } else { source },
         parent,
-        parameters: order.iter().filter_map(|p| Some((p.name.clone(), trial.parameter(&p.name)?))).collect(),
+        parameters: order.iter().filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect(),
         measured: parse(&trial.user_attributes, |_| true),
         value: trial.value,
         hand_value: kept.hand_value,

@@ -17,6 +17,9 @@ pub const APPROVAL_PAUSE: Duration = Duration::from_millis(800);
 /// Time after the first press in which the second one approves: a forgotten press must not leave the robot one key from a jump.
 pub const APPROVAL_TIME: Duration = Duration::from_secs(20);
 
+/// Most columns of a dialog: longer lines are hard to read.
+pub const MAX_WIDTH: u16 = 120;
+
 /// A dialog over the view; `selected` is a line of its list, `scroll` counts lines above the shown ones.
 #[derive(Debug, Clone)]
 #[expect(missing_docs, reason = "the names say the rest")]

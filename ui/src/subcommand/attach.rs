@@ -8,9 +8,10 @@ use clap_complete::ArgValueCandidates;
 use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
+use quadfrog::report::table;
 use quadfrog_console::app;
 use quadfrog_console::feed::Feed;
-use quadfrog_console::{notice, put_line, terminal};
+use quadfrog_console::{notice, output, terminal};
 
 use super::arguments;
 use super::completion;
@@ -54,9 +55,15 @@ pub fn list() -> Result<(), Failure> {
     if sessions.is_empty() {
         notice!("no session runs on this machine under this user");
     }
-    for session in &sessions {
-        put_line!("{}", described(&session.facts));
-    }
+    let heading = ["process", "robot", "task", "operator", "since (UTC)", "folder"].map(str::to_owned).to_vec();
+    let row = |session: &RunningSession| {
+        let SessionFacts { process, folder, robot, backend, task, operator, since } = &session.facts;
+        let (process, robot, folder) =
+            (process.to_string(), format!("{backend} {robot}"), folder.display().to_string());
+        vec![process, robot, task.clone(), operator.clone(), since.clone(), folder]
+    };
+    let rows: Vec<_> = std::iter::once(heading).chain(sessions.iter().map(row)).collect();
+    output::text(&table::aligned(&rows, |_| true));
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use super::request::{interrupt, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_request};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
-use crate::model::dialog::{Choice, Dialog, OverrideForm, Purpose, Question};
+use crate::model::dialog::{Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
 use crate::text::report;
 use crate::theme::Background;
@@ -183,7 +183,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
         Action::Report => {
-            let lines = report(&model.session);
+            let lines = report(&model.session, usize::from(model.size.0.min(MAX_WIDTH)).saturating_sub(4));
             open(model, Dialog::Report { lines, scroll: 0 });
         }
         Action::Theme => {

@@ -23,12 +23,9 @@ use super::draw::{number, scale, span, truncate};
 use super::{arming, help, log, questions, queue};
 use crate::legal::palette;
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, OverrideForm, Purpose};
+use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
 use crate::wrap::{wrap, wrap_all};
-
-/// Most columns of a dialog: longer lines are hard to read.
-const MAX_WIDTH: u16 = 120;
 
 /// Columns before the text of an action: its key and its name.
 const PALETTE_INDENT: usize = 26;
@@ -77,8 +74,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             render_lines(frame, area, model, ("Keys", width, "Up Down"), lines, *scroll)
         }
         Dialog::Report { lines, scroll } => {
-            let lines = lines.iter().cloned().map(Line::from).collect();
-            render_lines(frame, area, model, ("Study", 78, "Up Down"), lines, *scroll);
+            let width = area.width.min(MAX_WIDTH);
+            // The terminal may have become narrower since.
+            let lines: Vec<Line> = lines.iter().cloned().map(Line::from).collect();
+            let lines = wrap_all(&lines, usize::from(width.saturating_sub(4)), 0);
+            render_lines(frame, area, model, ("Study", width, "Up Down"), lines, *scroll);
         }
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
         Dialog::LogLine { scroll } => {

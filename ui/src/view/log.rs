@@ -61,7 +61,7 @@ fn summary(model: &Model, shown: usize) -> String {
     let back = if view.back > 0 { format!("; {} back", view.back) } else { String::new() };
     let key = |action| model.keymap.key(action);
     let (filter, search_key, open) = (key(Action::Filter), key(Action::Search), key(Action::Open));
-    format!("{shown} lines{back}; {level} ({filter}), {search} ({search_key}), whole line ({open})")
+    format!("{shown} lines{back}; {level} ({filter}), {search} ({search_key}), whole line ({open}); > steps of a trial")
 }
 
 /// Minutes, seconds and milliseconds since the session began.
