@@ -1,10 +1,5 @@
 //! A second person on the same machine: `quadfrog sessions` lists what runs, `quadfrog attach` watches it and passes STOP on.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::io::{BufRead, BufReader, Error, ErrorKind, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -12,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 
+use crate::pty::Session;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
-use pty::Session;
 
 const SIZE: (u16, u16) = (120, 40);
 

@@ -1,14 +1,12 @@
 //! The charts of the live view: every signal, axes, limits, commands beside measurements.
 
-mod support;
-
+use crate::support::{Console, assert_shows, tick};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, joint_name};
 use quadfrog::telemetry::{Snapshot, Tick};
 use quadfrog_console::message::Msg;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
-use support::{Console, assert_shows, tick};
 
 /// A console whose charts are these.
 fn charting(series: &[&str]) -> Console {

@@ -1,15 +1,12 @@
 //! The command line: output and exit status of complete runs of the program.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Stdio;
 
-use program::{Program, assert_shows, hold, journal_trials};
+use crate::program::{Program, assert_shows, hold, journal_trials};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use serde_json::Value;

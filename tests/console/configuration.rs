@@ -1,17 +1,10 @@
 //! `quadfrog config`, the user's own configuration, and `quadfrog init`, by the files and lines that the program writes.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "../support/python_reader.rs"]
-mod python_reader;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use program::{Program, assert_shows};
-use python_reader::read_by_python;
+use crate::program::{Program, assert_shows};
+use crate::python_reader::read_by_python;
 
 const FILES: [&str; 6] =
     ["control.toml", "safety.toml", "optimize.toml", "simulator.toml", "prior.toml", "console.toml"];

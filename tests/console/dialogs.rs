@@ -1,7 +1,6 @@
 //! Sentences that a person confirms are never cut.
 
-mod support;
-
+use crate::support::{Console, assert_shows, line_with, session, trial};
 use quadfrog::recording::record::{ArmingCheckRecord, Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
@@ -10,7 +9,6 @@ use quadfrog_console::action::ACTIONS;
 use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
-use support::{Console, assert_shows, line_with, session, trial};
 
 const SENTENCE: &str = "no person within 2 m of the robot, the remote control in the hand of the operator, and its stop \
                         combination known to everybody who is in the room and who has read the page on safe handling";

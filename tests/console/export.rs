@@ -1,20 +1,15 @@
 //! `quadfrog export` on recordings of the running program, read by pandas, polars and Python's mcap reader; `.ci/run` installs
 //! them, and the comparison is skipped with a message where they are missing.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use program::{Program, assert_shows, with_small_files};
+use crate::program::{Program, assert_shows, with_small_files};
+use crate::skip::skip;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
 use serde_json::Value;
-use skip::skip;
 
 /// A recording of two trials of the program, as an argument.
 fn recording(program: &Program) -> String {

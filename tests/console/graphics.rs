@@ -1,17 +1,14 @@
 //! The robot's picture in pixels, as the program sends it to a terminal that shows it, and everything that must remove it.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::pty::{Session, Setup};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
-use pty::{Session, Setup};
 use quadfrog::recording::player::Player;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::app::{self, ConsoleOptions};
@@ -330,7 +327,12 @@ fn suspending_and_a_panic_remove_the_picture() {
 
     let folder = tempfile::tempdir().expect("a folder");
     let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
-    command.args(["--ignored", "--exact", "a_console_with_a_picture_one_of_whose_threads_panics", "--nocapture"]);
+    command.args([
+        "--ignored",
+        "--exact",
+        "graphics::a_console_with_a_picture_one_of_whose_threads_panics",
+        "--nocapture",
+    ]);
     let setup = Setup { size: SIZE, cell: CELL, variables: &[COLOURS] };
     let mut session = Session::run_in(folder.path(), &setup, command);
     session.wait_for(&["REPLAY"]);

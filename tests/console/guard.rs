@@ -1,9 +1,6 @@
 //! The guard process, which damps a robot whose console died: the program, and a socket that records the commands in place
 //! of the robot.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::os::fd::OwnedFd;
@@ -14,9 +11,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::pty::Session;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use pty::Session;
 use quadfrog::config::Config;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;

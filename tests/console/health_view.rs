@@ -1,12 +1,10 @@
 //! View Health: the history of temperature, battery, link and lateness.
 
-mod support;
-
+use crate::support::{Console, assert_shows, line_with, session, tick};
 use quadfrog::recording::record::Record;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::telemetry::{Counters, Snapshot};
 use quadfrog_console::message::Msg;
-use support::{Console, assert_shows, line_with, session, tick};
 
 /// Ten minutes of a robot: a tick a second, with the values of each second.
 fn ran(temperature_c: f64, battery_percent: Option<f64>, link: bool) -> Console {

@@ -1,7 +1,6 @@
 //! From the landing to the verdict: the trial on the charts, the countdown, the questions before what cannot be meant.
 
-mod support;
-
+use crate::support::{Console, assert_shows, line_with, proposal, tick, trial};
 use quadfrog::recording::record::Record;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
@@ -9,7 +8,6 @@ use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
-use support::{Console, assert_shows, line_with, proposal, tick, trial};
 
 /// A trial runs: countdown of 1 s, impulse, flight, landing until 1.2 s after the impulse began.
 fn run(console: &mut Console, number: u32, from_ms: u64) {

@@ -1,7 +1,6 @@
 //! Keys in, requests out, on every screen.
 
-mod support;
-
+use crate::support::{Console, VIEWS, assert_shows, proposal, requests, session, trial};
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
@@ -14,7 +13,6 @@ use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::Role;
 use strum::VariantArray;
-use support::{Console, VIEWS, assert_shows, proposal, requests, session, trial};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]

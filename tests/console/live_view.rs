@@ -1,22 +1,13 @@
 //! The live view: a running session as viewers of Foxglove's protocol see it.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/python_reader.rs"]
-mod python_reader;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 
-use program::{Program, assert_shows};
-use pty::Session;
-use python_reader::read_by_python;
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
+use crate::python_reader::read_by_python;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_in;
 use serde_json::Value;

@@ -1,15 +1,10 @@
 //! View Log: the time of day, and whole lines.
 
-mod support;
-
-#[path = "support/pty.rs"]
-mod pty;
-
-use pty::Session;
+use crate::pty::Session;
+use crate::support::{Console, assert_shows, line_with, session};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, SessionInfo, Stamped};
 use quadfrog::telemetry::Mode;
 use quadfrog_console::message::{Msg, ReplayStatus, ReplayTimeline};
-use support::{Console, assert_shows, line_with, session};
 
 /// A console whose log has these lines.
 fn logged(texts: &[&str]) -> Console {

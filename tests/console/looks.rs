@@ -1,13 +1,10 @@
 //! Colours for dark and light backgrounds, the terminal's report of its background, and frames that appear whole.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::Path;
 use std::time::Duration;
 
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use pty::Session;
 use quadfrog_console::input::{Decoder, TerminalEvent};
 use quadfrog_console::theme::{Background, Colours, Glyphs, Role, Theme};
 use ratatui::style::Color;

@@ -1,13 +1,11 @@
 //! Safety of people near the robot: the first command, approvals on hardware, the countdown, an observer's STOP.
 
-mod support;
-
+use crate::support::{Console, session};
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Snapshot, Tick};
 use quadfrog::trial::Backend;
 use quadfrog_console::message::{Effect, Msg};
-use support::{Console, session};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]

@@ -1,15 +1,12 @@
 //! A study of twenty jumps by an operator who has read the README alone, with the mistakes that operators made when the console was
 //! reviewed: each is caught, refused or taken back, and the study is complete.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use pty::Session;
 
 const DOWN: &str = "\x1b[B";
 const ESCAPE: &str = "\x1b";

@@ -2,17 +2,12 @@
 //! (`pip install --no-deps --target target/optuna-4 optuna==4.9.0`), Optuna 5 in Python itself; `.ci/run` installs both. A
 //! test is skipped with a message where one of them, pandas, pyarrow or plotly is missing.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::path::Path;
 use std::process::Command;
 
-use program::{Program, assert_shows};
+use crate::program::{Program, assert_shows};
+use crate::skip::skip;
 use serde_json::{Value, json};
-use skip::skip;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 /// A zone without UTC: a local time that is taken for UTC is seen.

@@ -1,18 +1,13 @@
 //! Output of the commands: no control character of any file, name or argument reaches the terminal, a full disk behind
 //! standard output is an error, colours and defect reports.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
+use crate::program::{Program, with_small_files};
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::{Program, with_small_files};
-use pty::Session;
 
 /// Sets the title of a terminal, rings, and colours the rest red by an 8-bit control character.
 const HOSTILE: &str = "\u{1b}]0;owned\u{7}\u{9b}31m";

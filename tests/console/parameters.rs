@@ -1,11 +1,8 @@
 //! More parameters than the paper's on the running program: the second direction of a task, and gains.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 
-use program::{Program, assert_shows};
+use crate::program::{Program, assert_shows};
 use serde_json::Value;
 
 const SEARCH: &str = "[bounds]

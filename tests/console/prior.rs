@@ -1,21 +1,14 @@
 //! `quadfrog prior`, studies of the sampler `sim`, and `quadfrog ask-tell`, on the running program.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::fs;
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::PathBuf;
 use std::process::Command;
 
-use program::{Program, assert_shows};
-use pty::Session;
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
+use crate::skip::skip;
 use serde_json::Value;
-use skip::skip;
 
 /// The program with a configuration of a small prior in `mine`.
 fn small() -> Program {

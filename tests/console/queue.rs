@@ -1,15 +1,10 @@
 //! The running program: the queue as the operator sees, orders and shortens it, and as Python Optuna reads it afterwards.
 
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use pty::Session;
-use skip::skip;
+use crate::pty::Session;
+use crate::skip::skip;
 
 fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs")

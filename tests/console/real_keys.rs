@@ -1,15 +1,12 @@
 //! The visible effect of every key of the default keymap, on the program in a pseudo-terminal. A key without a row fails.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::pty::Session;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
-use pty::Session;
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::settings::ConsoleSettings;
 

@@ -1,22 +1,18 @@
 //! All views of a recorded session of the simulator, as text, at five sizes, and in colours for a dark and a light background.
-//! `cargo test -p quadfrog-console --test recorded -- --ignored` renews the recording, then
-//! `INSTA_UPDATE=always cargo test -p quadfrog-console --test recorded` the expected screens.
-
-#[path = "support/pty.rs"]
-mod pty;
-mod support;
+//! `cargo test --test console recorded -- --ignored` renews the recording, then
+//! `INSTA_UPDATE=always cargo test --test console recorded` the expected screens.
 
 use std::path::{Path, PathBuf};
 
+use crate::pty::Session;
+use crate::support::Console;
 use portable_pty::CommandBuilder;
-use pty::Session;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::Record;
 use quadfrog::recording::writer::Writer;
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Background, Colours, Glyphs, Theme};
-use support::Console;
 
 const VIEWS: [(&str, &str); 6] =
     [("1", "live"), ("2", "trials"), ("3", "optimizer"), ("4", "override"), ("5", "health"), ("6", "log")];

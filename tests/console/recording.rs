@@ -1,26 +1,17 @@
 //! Recordings that the program itself wrote, read by other people's readers.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/python_reader.rs"]
-mod python_reader;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-use program::Program;
-use pty::Session;
-use python_reader::read_by_python;
+use crate::program::Program;
+use crate::pty::Session;
+use crate::python_reader::read_by_python;
+use crate::skip::skip;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Mode;
 use serde_json::Value;
-use skip::skip;
 
 const SIZE: (u16, u16) = (100, 30);
 

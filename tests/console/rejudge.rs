@@ -1,17 +1,12 @@
 //! `quadfrog rejudge` on a file that the program itself wrote.
 
-#[path = "support/precision.rs"]
-mod precision;
-#[path = "support/program.rs"]
-mod program;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use precision::{PRECISION, assert_same};
-use program::{Program, assert_shows};
+use crate::precision::{PRECISION, assert_same};
+use crate::program::{Program, assert_shows};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
 use serde_json::Value;

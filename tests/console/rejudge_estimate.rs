@@ -1,16 +1,11 @@
 //! `quadfrog rejudge` on recordings of an own robot, of trials with several rollouts, and with another estimator.
 
-#[path = "support/precision.rs"]
-mod precision;
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use precision::{PRECISION, assert_same};
-use program::{Program, assert_shows};
+use crate::precision::{PRECISION, assert_same};
+use crate::program::{Program, assert_shows};
 use quadfrog::recording::player::Played;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;

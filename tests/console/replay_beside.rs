@@ -1,16 +1,11 @@
 //! Two trials, or two recordings, beside each other in `quadfrog replay`, on files that the program itself wrote.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::{Program, assert_shows};
-use pty::Session;
 use quadfrog::recording::player::Played;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::telemetry::Tick;

@@ -1,16 +1,11 @@
 //! `quadfrog replay --follow` of a session that continues in the next file of its folder.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::Path;
 use std::process::Stdio;
 
+use crate::program::Program;
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::Program;
-use pty::Session;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
 

@@ -1,17 +1,12 @@
 //! Trials judged again by another configuration in `quadfrog replay`, on files that the program itself wrote.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::{Program, assert_shows};
-use pty::Session;
 use serde_json::Value;
 
 /// A study of six trials, every tick recorded, and two configurations: a strict limit of a fall, and a rate as objective.

@@ -1,13 +1,10 @@
 //! `quadfrog report` on studies that the program made.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use program::{Program, assert_shows};
+use crate::program::{Program, assert_shows};
 use serde_json::Value;
 use xml::reader::{EventReader, XmlEvent};
 

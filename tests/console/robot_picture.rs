@@ -1,8 +1,6 @@
 //! The picture of the robot in view Live: legs, attitude, path and landing spots.
 
-#[path = "support/mod.rs"]
-mod support;
-
+use crate::support::{Console, tick, trial};
 use quadfrog::config::Config;
 use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
@@ -13,7 +11,6 @@ use quadfrog_console::model::{Model, RobotFacts};
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use ratatui::buffer::{Buffer, Cell};
-use support::{Console, tick, trial};
 
 /// Stance of the Go1, rad: hip, thigh, calf.
 const STANCE_RAD: [f64; 3] = [0.0, 0.8, -1.6];

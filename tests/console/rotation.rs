@@ -1,21 +1,12 @@
 //! Recordings in several files, as the program itself writes them: each complete in itself, together one session.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/python_reader.rs"]
-mod python_reader;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use program::{Program, assert_shows};
-use pty::Session;
-use python_reader::read_by_python;
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
+use crate::python_reader::read_by_python;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::Record;
 use quadfrog::recording::session_files::recordings_in;

@@ -1,20 +1,15 @@
 //! Recordings that are still written, cannot be finished or do not fit on the disk: `quadfrog recover`, the console and
 //! `quadfrog optimize`.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
+use crate::program::{Program, assert_shows, with_small_files};
+use crate::pty::Session;
 use nix::fcntl::{FcntlArg, fcntl};
 use portable_pty::CommandBuilder;
-use program::{Program, assert_shows, with_small_files};
-use pty::Session;
 use quadfrog::recording::player::Player;
 
 const SIZE: (u16, u16) = (100, 30);

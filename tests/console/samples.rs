@@ -1,16 +1,11 @@
 //! The samples of `recordings/samples`: whole, small, of the present format, and played.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::{Program, assert_shows};
-use pty::Session;
 use quadfrog::recording::player::Player;
 
 fn samples() -> PathBuf {

@@ -1,7 +1,7 @@
 //! The screen at every size and in every state: mode, STOP and the next step are always shown.
 
-mod support;
-
+use crate::support;
+use crate::support::{Console, VIEWS, assert_shows, line_with, tick, trial};
 use quadfrog::recording::record::{LogLevel, Record};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{ExperimentStage, Verdict};
@@ -9,7 +9,6 @@ use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::model::Notice;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Colours, Glyphs, Role, Theme};
-use support::{Console, VIEWS, assert_shows, line_with, tick, trial};
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 

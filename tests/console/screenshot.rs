@@ -1,16 +1,11 @@
 //! `quadfrog screenshot`: the picture has the characters of the screen at their places.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
 use portable_pty::CommandBuilder;
-use program::{Program, assert_shows};
-use pty::Session;
 use xml::attribute::OwnedAttribute;
 use xml::reader::{EventReader, XmlEvent};
 

@@ -1,9 +1,8 @@
 //! Search and readiness on the screen: view Override, densities, repeats, a finished study, the arming checks, the link.
 
-mod support;
-
 use std::time::Duration;
 
+use crate::support::{Console, assert_shows, line_with, requests, session, tick, trial};
 use quadfrog::config::Config;
 use quadfrog::optimize::journal::WaitedFor;
 use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
@@ -22,7 +21,6 @@ use quadfrog_console::message::{Effect, ExportedRows, Msg};
 use quadfrog_console::model::View;
 use quadfrog_console::model::dialog::Dialog;
 use strum::VariantArray;
-use support::{Console, assert_shows, line_with, requests, session, tick, trial};
 
 /// The search space: Fx as given, the others as the session began.
 fn search(fx: (f64, f64), fixed: Option<FixedParameter>) -> SearchStatus {

@@ -1,16 +1,13 @@
 //! STOP keys from the terminal's bytes to the latch: no state of the decoder and no blocked screen loses one.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::io::Write;
 use std::os::fd::OwnedFd;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use crate::pty::Session;
 use nix::sys::stat::Mode as FileMode;
 use nix::unistd::mkfifo;
-use pty::Session;
 use quadfrog::realtime::channel::StopLatch;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;

@@ -1,17 +1,12 @@
 //! `quadfrog study` on stored studies.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use program::{Program, assert_shows, counted_trials, hold};
+use crate::program::{Program, assert_shows, counted_trials, hold};
+use crate::skip::skip;
 use serde_json::Value;
-use skip::skip;
 
 /// A finished study of six trials, and its folder.
 fn study(task: &str) -> (Program, String) {
@@ -32,7 +27,8 @@ fn studies_are_listed_and_shown() {
     let name = Path::new(&study).file_name().unwrap().to_str().unwrap();
     assert!(line.contains(name), "{list}");
     let cells: Vec<&str> = line.split_whitespace().collect();
-    let falls = program.exported(&study).iter().filter(|row| row["user_attrs"]["verdict"] == "fall").count().to_string();
+    let falls =
+        program.exported(&study).iter().filter(|row| row["user_attrs"]["verdict"] == "fall").count().to_string();
     // Seed, trials, those that count (without a person none is void), falls.
     assert_eq!(cells[2..6], ["0", "6", "6", &falls], "{list}");
     let show = program.text(&["study", "show", &study]);

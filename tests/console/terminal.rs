@@ -1,14 +1,11 @@
 //! The program in a pseudo-terminal: a session by keys, and all ways to lose or leave the terminal.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::pty::Session;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
-use pty::Session;
 use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
 use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::player::Player;
@@ -319,7 +316,7 @@ fn a_hang_up_without_a_signal_is_detected() {
 fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
     let folder = folder();
     let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
-    command.args(["--ignored", "--exact", "a_console_one_of_whose_threads_panics", "--nocapture"]);
+    command.args(["--ignored", "--exact", "terminal::a_console_one_of_whose_threads_panics", "--nocapture"]);
     let mut session = Session::run(folder.path(), (100, 30), command);
     session.wait_for(&["REPLAY", "no robot to stop"]);
     assert!(!session.wait().success());

@@ -1,7 +1,6 @@
 //! The screen shows the present, or the time of what it shows.
 
-mod support;
-
+use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, Transition};
 use quadfrog::robot::{Battery, LinkStatus};
@@ -15,7 +14,6 @@ use quadfrog::trial::{
 };
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
-use support::{Console, assert_shows, line_with, session, tick, trial};
 
 fn at_time(console: &mut Console, time_s: u64) {
     let tick = Tick { time_ns: time_s * 1_000_000_000, ..console.model.snapshot.tick };

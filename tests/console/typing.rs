@@ -1,14 +1,13 @@
 //! Text fields: what a key does to the text that is there.
 
-mod support;
-
+use crate::support;
+use crate::support::{Console, assert_shows, session, trial};
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
-use support::{Console, assert_shows, session, trial};
 
 /// A finished study.
 fn finished() -> Console {

@@ -1,12 +1,9 @@
 //! The running program: a verdict that has become final is changed, and the files that the session leaves hold both.
 
-#[path = "support/pty.rs"]
-mod pty;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use pty::Session;
+use crate::pty::Session;
 
 /// Output of `quadfrog` with these arguments.
 fn quadfrog(folder: &Path, arguments: &[&str]) -> String {

@@ -1,11 +1,8 @@
 //! `quadfrog verify` on files that the program itself wrote, whole and altered.
 
-#[path = "support/program.rs"]
-mod program;
-
 use std::path::{Path, PathBuf};
 
-use program::{Program, assert_shows};
+use crate::program::{Program, assert_shows};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::SessionInfo;
 use quadfrog::recording::writer::Writer;

@@ -1,9 +1,8 @@
 //! Keys of the views in, screen out: charts, trial table, mouse, replay.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::{Record, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
@@ -18,7 +17,6 @@ use quadfrog_console::settings::{BellCause, ConsoleSettings, DEFAULT};
 use quadfrog_console::text;
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 use strum::VariantArray;
-use support::{Console, assert_shows, line_with, session, tick, trial};
 
 /// A console after the jumps of some trials, each a second after the one before; roll depends on the trial.
 fn jumped(trials: &[u32]) -> Console {

@@ -1,22 +1,15 @@
 //! Waits of the program and what ends them: the lock of another program, another worker's trial; and threads that the system
 //! does not grant.
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "support/pty.rs"]
-mod pty;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use program::{Program, assert_shows};
-use pty::Session;
-use skip::skip;
+use crate::program::{Program, assert_shows};
+use crate::pty::Session;
+use crate::skip::skip;
 
 /// A study of two trials.
 fn study(program: &Program) -> PathBuf {

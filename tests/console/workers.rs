@@ -1,24 +1,17 @@
 //! Several worker processes on one study, one of them killed, and a worker of Optuna, on a journal file and on a Redis
 //! server (skipped with a message if `redis-server` or Optuna is missing).
 
-#[path = "support/program.rs"]
-mod program;
-#[path = "../support/redis.rs"]
-mod redis;
-#[path = "../support/skip.rs"]
-mod skip;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-use program::{Program, assert_shows, hold};
+use crate::program::{Program, assert_shows, hold};
+use crate::redis::{Ended, server};
+use crate::skip::skip;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
-use redis::{Ended, server};
 use serde_json::Value;
-use skip::skip;
 
 /// Number of trials of all workers together.
 const BUDGET: usize = 400;

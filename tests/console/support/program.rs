@@ -1,7 +1,5 @@
 //! Complete runs of the program in a temporary folder.
 
-#![allow(dead_code, reason = "each test program uses a part")]
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

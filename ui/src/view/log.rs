@@ -5,7 +5,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::draw::{heading, span, truncate, wall_clock};
+use super::draw::{heading, heading_width, span, truncate, wall_clock};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::log::LogLine;
@@ -14,7 +14,10 @@ use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let lines: Vec<&LogLine> = model.log_view.lines(&model.session.log).collect();
-    let body = heading(frame, area, &model.theme, "Log", &summary(model, lines.len()));
+    let summary = summary(model, lines.len());
+    let explained = format!("{summary}; > of a trial");
+    let aside = if heading_width("Log", &explained) <= usize::from(area.width) { explained } else { summary };
+    let body = heading(frame, area, &model.theme, "Log", &aside);
     let space = usize::from(body.height);
     let Some(newest) = lines.len().checked_sub(1) else { return };
     let selected = newest.saturating_sub(model.log_view.back);
@@ -61,7 +64,7 @@ fn summary(model: &Model, shown: usize) -> String {
     let back = if view.back > 0 { format!("; {} back", view.back) } else { String::new() };
     let key = |action| model.keymap.key(action);
     let (filter, search_key, open) = (key(Action::Filter), key(Action::Search), key(Action::Open));
-    format!("{shown} lines{back}; {level} ({filter}), {search} ({search_key}), whole line ({open}); > steps of a trial")
+    format!("{shown} lines{back}; {level} ({filter}), {search} ({search_key}), whole line ({open})")
 }
 
 /// Minutes, seconds and milliseconds since the session began.

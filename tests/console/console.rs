@@ -1,0 +1,69 @@
+//! Tests of the console and of its command line, in one program: it is linked once, and its files run beside each other.
+//! `cargo test --test console log_view` runs one file. Programs of their own are `memory`, with another allocator, and `measure`.
+
+#[path = "support/precision.rs"]
+mod precision;
+#[path = "support/program.rs"]
+mod program;
+#[path = "support/pty.rs"]
+mod pty;
+#[path = "../support/python_reader.rs"]
+mod python_reader;
+#[path = "../support/redis.rs"]
+mod redis;
+#[path = "../support/skip.rs"]
+mod skip;
+mod support;
+
+mod attach;
+mod cell_encoder;
+mod charts;
+mod command_line;
+mod configuration;
+mod connection;
+mod dialogs;
+mod evaluate;
+mod export;
+mod graphics;
+mod guard;
+mod health_view;
+mod judging;
+mod keys;
+mod live_view;
+mod log_view;
+mod looks;
+mod near_robot;
+mod operator_mistakes;
+mod optuna_versions;
+mod output;
+mod parameters;
+mod prior;
+mod queue;
+mod real_keys;
+mod recorded;
+mod recording;
+mod rejudge;
+mod rejudge_estimate;
+mod replay;
+mod replay_beside;
+mod replay_follow;
+mod replay_rejudge;
+mod report;
+mod reproduce;
+mod robot_picture;
+mod rotation;
+mod safe_handling;
+mod samples;
+mod screens;
+mod screenshot;
+mod search;
+mod stop_keys;
+mod study_command;
+mod terminal;
+mod truth;
+mod typing;
+mod verdict_change;
+mod verify;
+mod views;
+mod waits;
+mod workers;
