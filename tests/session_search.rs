@@ -506,3 +506,43 @@ fn a_change_of_the_queue_that_was_cut_off_loses_and_doubles_nothing() {
     let [a, b, c] = [(10.0, false), (20.0, true), (30.0, false)];
     assert_eq!(seen, [vec![a, b, c], vec![a, c, b], vec![c, a, b], vec![a, b]]);
 }
+
+/// Regression: a point that was queued while the last verdict could be taken back took the number of the re-run that was proposed.
+#[test]
+fn a_point_queued_after_a_rerun_comes_behind_it() {
+    let mut experiment = experiment(20);
+    let spec = run(&mut experiment, TrialEnd::Fell(FallCause::BodyContact));
+    experiment.judge(Verdict::Void, true).unwrap();
+    let proposed = experiment.proposal().unwrap();
+    experiment.enqueue(&[("Fx".into(), 77.0)]).unwrap();
+    let now = experiment.proposal().unwrap();
+    assert_eq!((now.trial, now.source, now.parent), (proposed.trial, ProposalSource::Rerun, Some(spec.trial)));
+    let queue: Vec<u32> = search(&mut experiment).queue.iter().map(|point| point.trial).collect();
+    assert_eq!(queue, [proposed.trial, proposed.trial + 1]);
+    assert!(experiment.undo().is_err(), "the verdict is final with its re-run in the queue");
+    // The re-run can be removed like any other point, also at once.
+    experiment.remove_queued(proposed.trial).unwrap();
+    assert_eq!(value(&experiment, "Fx"), 77.0);
+}
+
+/// Regression: of points that another program queued behind the proposal a session showed none before its next jump.
+#[test]
+fn points_queued_elsewhere_behind_the_proposal_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let mut other = study_in(folder.path());
+    for fx_n in [10.0, 20.0, 30.0] {
+        other.enqueue(&[("Fx".into(), fx_n)], &[]).unwrap();
+        experiment.refresh().unwrap();
+    }
+    assert_eq!(value(&experiment, "Fx"), 10.0);
+    let shown = |experiment: &mut Experiment| -> Vec<f64> {
+        search(experiment).queue.iter().filter_map(|point| point.parameters.get("Fx")).collect()
+    };
+    assert_eq!(shown(&mut experiment), [10.0, 20.0, 30.0]);
+    other.exchange_waiting(1, 2).unwrap();
+    let revision = experiment.proposal().unwrap().revision;
+    experiment.refresh().unwrap();
+    assert_eq!(shown(&mut experiment), [10.0, 30.0, 20.0]);
+    assert_eq!(experiment.proposal().unwrap().revision, revision, "the proposal stays");
+}

@@ -8,9 +8,10 @@ use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
-use crate::optimize::trial::{Distribution, Trial};
+use crate::optimize::trial::{Distribution, Trial, TrialState};
 use crate::session::experiment::attributes::StudyAttributes;
-use crate::trial::{ParameterInfo, Task};
+use crate::session::experiment::rows_of;
+use crate::trial::{ParameterInfo, Task, TrialRecord, Verdict};
 
 /// Description of a stored study of this program.
 #[expect(missing_docs, reason = "the types say the rest")]
@@ -58,6 +59,25 @@ impl Opened {
     /// Returns the unit of the objective; empty where it is not known.
     pub fn unit(&self) -> &str {
         self.ours.as_ref().map_or("", |ours| ours.unit.as_deref().unwrap_or(ours.task.unit()))
+    }
+
+    /// Returns the trial table.
+    pub fn rows(&self) -> Vec<TrialRecord> {
+        rows_of(&self.study, &self.parameters)
+    }
+
+    /// Returns the row of the best trial, with a verdict that its session can still take back, as that session shows it.
+    pub fn best<'a>(&self, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
+        let stored = self.study.best().and_then(|best| rows.iter().find(|row| row.trial == best.number));
+        let judged = |row: &&TrialRecord| {
+            let running = self.study.trial(row.trial).is_ok_and(|trial| trial.state == TrialState::Running);
+            // A repeat counts with the others of its point.
+            running && row.verdict == Some(Verdict::Accept) && row.parent.is_none()
+        };
+        let best_first = |a: &&TrialRecord, b: &&TrialRecord| {
+            self.study.options().direction.best_first(a.value.unwrap_or(f64::NAN), b.value.unwrap_or(f64::NAN))
+        };
+        stored.into_iter().chain(rows.iter().filter(judged)).filter(|row| row.value.is_some()).min_by(best_first)
     }
 }
 

@@ -5,7 +5,7 @@ use super::study::{ReportedStudy, TrialChoice, by_task};
 use super::study_figures::{DrawnTrial, TaskStudies, drawn};
 use super::study_tables::{self as tables, title};
 use crate::optimize::ask::Direction;
-use crate::trial::Task;
+use crate::trial::{ParameterInfo, Task, six_digits};
 
 /// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn; `version`: that of the program
 /// that writes the report, with its commit.
@@ -172,6 +172,7 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
     let mut section = Section::new("Configuration");
     let mut shown: Vec<&ReportedStudy> = Vec::new();
     for study in studies {
+        section.paragraph(bounds(study));
         if study.configuration.is_empty() {
             section.paragraph(format!("{}: no configuration was kept.", title(study)));
             continue;
@@ -194,6 +195,13 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
         shown.push(study);
     }
     section
+}
+
+/// The present bounds, which the operator may have changed during the study.
+fn bounds(study: &ReportedStudy) -> String {
+    let range = |p: &ParameterInfo| format!("{} {} to {} {}", p.name, six_digits(p.low), six_digits(p.high), p.unit);
+    let ranges: Vec<String> = study.parameters.iter().map(range).collect();
+    format!("{}: searched last over {}.", title(study), ranges.join(", "))
 }
 
 fn recordings(studies: &[ReportedStudy]) -> Section {

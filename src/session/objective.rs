@@ -223,7 +223,7 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::Settled => (Verdict::Accept, "landed and settled".into()),
         TrialEnd::NotQuiet => (Verdict::Fall, "did not come to rest".into()),
         TrialEnd::Fell(cause) => (Verdict::Fall, cause.to_string()),
-        TrialEnd::Stopped => (Verdict::Void, "stopped by the operator".into()),
+        TrialEnd::Stopped => (Verdict::Void, "STOP was pressed".into()),
         TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
         TrialEnd::Held(inhibit) => (Verdict::Void, format!("no further jump: {inhibit}")),

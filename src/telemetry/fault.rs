@@ -55,8 +55,7 @@ pub enum Fault {
     PoseTimeout { error_rad: f64 },
     #[error("operator lost: no heartbeat of the operator's console for {silent_ms} ms")]
     OperatorLost { silent_ms: u32 },
-    /// Also when the session's terminal was lost.
-    #[error("operator lost: the session ended before the robot had landed")]
+    #[error("the session ended: the program was quit or its terminal was lost")]
     OperatorLeft,
     #[error("the command could not be sent (error {errno})")]
     Send { errno: i32 },

@@ -1,10 +1,10 @@
 //! From the landing to the verdict: the trial on the charts, the countdown, the questions before what cannot be meant.
 
-use crate::support::{Console, assert_shows, line_with, proposal, tick, trial};
-use quadfrog::recording::record::Record;
+use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
+use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
-use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
@@ -358,7 +358,10 @@ fn the_question_before_quitting_says_what_becomes_of_the_waiting_trial() {
     ] {
         let mut console = Console::review(Mode::Review, suggested);
         assert_eq!(console.press(&["q"]), []);
-        assert_shows(&console.screen(120, 40), &["Quit?", "it will sit down", "Trial #0 has no verdict yet.", follows]);
+        assert_shows(
+            &console.screen(120, 40),
+            &["Quit?", "The simulation ends as the robot stands", "Trial #0 has no verdict yet.", follows],
+        );
     }
 }
 
@@ -442,4 +445,76 @@ fn after_a_cancelled_countdown_the_line_names_the_key_that_keeps_the_point() {
         let screen = console.screen(columns, rows);
         assert_shows(screen.lines().last().unwrap(), &["Judge it: v void (suggested)", "r re-run of this point"]);
     }
+}
+
+/// Regression: letters of a reason whose field had not opened were commands; the r among them queued a jump.
+#[test]
+fn a_judged_row_is_queued_again_after_a_question() {
+    let mut console = Console::ready();
+    console.judged(2);
+    console.press(&["2", "Home"]);
+    assert_eq!(console.requests(&["r"]), []);
+    assert_shows(&console.screen(80, 24), &["Queue it again?", "Press y to queue trial #0 again"]);
+    assert_eq!(console.requests(&["x"]), []);
+    assert_eq!(console.requests(&["r", "y"]), [OperatorRequest::Rerun { trial: Some(0) }]);
+}
+
+/// Regression: the question said that a simulated robot sits down, and nothing of the trial that was under way.
+#[test]
+fn the_question_before_quitting_says_what_becomes_of_the_robot_and_of_the_trial() {
+    let question = |mode: Mode, stage: ExperimentStage, backend: Backend| {
+        let mut console = Console::ready();
+        console.record(Record::Session(SessionInfo { backend: Some(backend), ..session() }));
+        console.stage(stage, 0);
+        console.mode(mode);
+        console.press(&["q"]);
+        console.screen(120, 40)
+    };
+    let (simulator, hardware) = (Backend::Simulator, Backend::Hardware);
+    let ends = "The simulation ends as the robot stands";
+    assert_shows(&question(Mode::Ready, ExperimentStage::Proposed, simulator), &[ends, "trials count so far"]);
+    assert_shows(&question(Mode::Ready, ExperimentStage::Proposed, hardware), &["it will sit down before"]);
+    let lands = "the robot lands first; it is void, and its parameters run again";
+    assert_shows(&question(Mode::Jump, ExperimentStage::Running, simulator), &["Trial #0 is under way", lands]);
+    let waits = "it has landed, is measured, and waits until the study is continued";
+    assert_shows(&question(Mode::Settle, ExperimentStage::Running, hardware), &["Trial #0 is under way", waits]);
+}
+
+/// Regression: after STOP the line left out the key that runs the point again, and `u undo` did not name its trial.
+#[test]
+fn the_line_after_a_stop_names_the_rerun_and_that_of_undo_its_trial() {
+    let console = Console::review(Mode::Damped, Verdict::Void);
+    assert_shows(console.screen(120, 40).lines().last().unwrap(), &["STOPPED", "r re-run"]);
+    let mut console = Console::ready();
+    for verdict in [None, Some(Verdict::Accept)] {
+        console.record(Record::Trial(trial(0, verdict, Some(Verdict::Accept))));
+    }
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    console.mode(Mode::Disarmed);
+    assert_shows(console.screen(120, 40).lines().last().unwrap(), &["u undo #0"]);
+}
+
+/// Regression: Esc with nothing to close said that no trial is beside another, and hid the message before it.
+#[test]
+fn esc_with_nothing_to_close_says_nothing() {
+    let mut console = Console::ready();
+    console.press(&["b"]);
+    let said = console.said().to_owned();
+    assert!(!said.is_empty());
+    console.press(&["Esc", "Esc"]);
+    assert_eq!(console.said(), said);
+}
+
+/// Regression: beside a suggested fall a value by hand was shown as if it counted.
+#[test]
+fn a_value_by_hand_beside_a_suggested_fall_counts_if_accepted() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    let row = TrialRecord { hand_value: Some(0.66), value: Some(0.0), ..trial(0, None, Some(Verdict::Fall)) };
+    console.record(Record::Trial(row));
+    console.stage(ExperimentStage::Review, 0);
+    console.mode(Mode::Review);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["0.660 m by hand, if accepted"]);
+    assert!(!screen.contains("0.000h"), "{screen}");
 }

@@ -253,3 +253,27 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     replay.send("q");
     assert!(replay.wait().success());
 }
+
+/// Regression: beside a running console, report and table said "running" and "no trial was accepted" of a trial whose verdict was on
+/// the screen.
+#[test]
+fn another_shell_shows_a_verdict_that_can_still_be_taken_back() {
+    let (folder, mut session) = Session::opened((120, 40), &["--trials", "1", "--seed", "3"]);
+    let trial = jump(&mut session);
+    let recordings = folder.path().join("recordings");
+    let at = recordings.is_dir().then_some(recordings).unwrap_or_else(|| folder.path().to_owned());
+    let study = study(&at);
+    let place = study.to_str().expect("a path");
+    let show = quadfrog(folder.path(), &["study", "show", place]);
+    assert!(show.contains(&format!("Trial {trial} waits for its verdict")) && !show.contains("running"), "{show}");
+    judge_as_suggested(&mut session, trial);
+    let show = quadfrog(folder.path(), &["study", "show", place]);
+    let best = show.lines().last().unwrap_or_default().to_owned();
+    assert!(best.starts_with("Best: trial ") && best.ends_with("accept") && !show.contains("running"), "{show}");
+    assert!(show.contains("seed: 3") && !show.contains("seed 0"), "the sampler's seed is the study's: {show}");
+    let list = quadfrog(folder.path(), &["study", "list", at.to_str().expect("a path")]);
+    assert!(!list.lines().nth(1).unwrap_or_default().ends_with('-'), "{list}");
+    let report = quadfrog(folder.path(), &["report", place]);
+    assert!(!report.contains("was accepted") && report.contains("searched last over f0"), "{report}");
+    session.quit();
+}

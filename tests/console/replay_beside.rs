@@ -207,8 +207,11 @@ fn what_cannot_lie_beside_is_refused() {
         session.send("\x1b");
         session.wait_until("closed", || !session.screen().contains("Which trial"));
     }
+    // Esc has nothing to end then, and the answer of the field stays.
     session.send("\x1b");
-    session.wait_for(&["no trial is beside or under another"]);
+    session.send("?");
+    session.wait_for(&["no trial beside or under another any longer"]);
+    assert!(!session.screen().contains("is not possible"), "{}", session.screen());
 }
 
 #[test]

@@ -284,7 +284,7 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
         assert_eq!(states, [TrialState::Fail, TrialState::Waiting], "{way:?}");
         assert_eq!(trials[0].user_attributes["verdict"], "void", "{way:?}");
         let cause = trials[0].user_attributes["cause"].as_str().expect("a cause");
-        assert!(cause.starts_with("operator lost"), "{way:?}: {cause}");
+        assert!(cause.starts_with("the session ended"), "{way:?}: {cause}");
 
         // Another program continues the study.
         let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));

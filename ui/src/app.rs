@@ -12,6 +12,7 @@ use crossterm::clipboard::CopyToClipboard;
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::record::LogLevel;
+use quadfrog::telemetry::Mode;
 use ratatui::Frame;
 use ratatui::widgets::Clear;
 use tokio::signal::unix::{SignalKind, signal};
@@ -419,8 +420,10 @@ impl Console {
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
         let stop = self.feed.handle().map(EngineHandle::stop_latch);
-        if self.model.robot_is_energised() {
-            say(&mut self.model, LogLevel::Info, "the robot sits down, then the program ends".to_owned());
+        let jumps = matches!(self.model.mode(), Mode::Jump | Mode::Settle);
+        if self.model.robot_is_energised() && (jumps || self.model.session.info.is_hardware()) {
+            let first = if jumps { "lands" } else { "sits down" };
+            say(&mut self.model, LogLevel::Info, format!("quitting: the robot {first}, then the program ends"));
         }
         self.redraw = true;
         self.draw_if_due()?;

@@ -379,7 +379,8 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect(),
         measured: parse(&trial.user_attributes, |_| true),
-        value: trial.value,
+        // A verdict that can still be taken back has its value already.
+        value: trial.value.or(kept.value.filter(|_| matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall)))),
         hand_value: kept.hand_value,
         suggested: kept.suggested,
         cause: kept.cause.unwrap_or_default(),

@@ -41,7 +41,7 @@ use crate::optimize::journal::JournalWait;
 use crate::optimize::prior::PriorModel;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
-use crate::optimize::trial::TrialState;
+use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
 use crate::trial::{Backend, ExperimentStage, ParameterInfo, Proposal, SearchStatus, TrialRecord, Verdict};
@@ -281,6 +281,7 @@ impl Experiment {
                     self.log("another program has changed the queue: a new proposal follows".to_owned());
                     self.propose()?;
                 }
+                self.publish_queue()?;
             }
             _ => {
                 let room = self.queue.occupied(self.study.trials()) < self.plan.budget;
@@ -366,6 +367,11 @@ impl Experiment {
             self.log(message);
         }
     }
+}
+
+/// Whether a trial was measured and waits for the verdict of a person.
+pub fn waits_for_verdict(trial: &Trial) -> bool {
+    trial.state == TrialState::Running && TrialAttributes::of(trial).is_unjudged()
 }
 
 /// Returns the trial table of a stored study: every trial but those that wait.

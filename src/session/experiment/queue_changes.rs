@@ -3,7 +3,7 @@
 use super::Experiment;
 use super::attributes::{self, Origin, RemovedAttributes};
 use super::plan::{RequestRefusal, not_now};
-use crate::optimize::study::{Outcome, Study, TellOutcome};
+use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{ParameterValues, QueuedPoint, Verdict};
 
@@ -58,11 +58,33 @@ impl Experiment {
         Ok(())
     }
 
+    /// Publishes what another program has changed behind the next point of the queue. The proposal stays.
+    pub(super) fn publish_queue(&mut self) -> Result<(), StudyError> {
+        let stored = self.study.trials().len();
+        let shown = self.published_search.iter().flat_map(|search| &search.queue);
+        // Beyond them are a re-run and a repeat of the best that the study does not have yet.
+        let shown: Vec<&QueuedPoint> = shown.filter(|point| (point.trial as usize) < stored).collect();
+        if !queued_points(&self.study).iter().eq(shown) {
+            let study = self.study_with_verdict()?;
+            self.publish_search(&study);
+        }
+        Ok(())
+    }
+
+    /// Queues the re-run of the last verdict, which is final then: what changes the queue must see it in its place.
+    pub(super) fn queue_rerun(&mut self) -> Result<(), RequestRefusal> {
+        if self.pending_verdict.as_ref().is_some_and(|pending| pending.rerun) {
+            self.report_verdict()?;
+        }
+        Ok(())
+    }
+
     fn must_be_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
+        self.queue_rerun()?;
         self.study.refresh()?;
         let Some(queued) = self.study.waiting().find(|waiting| waiting.number == trial) else {
-            return not_now(format!("trial {trial} is not in the queue, or only once the last verdict is final"));
+            return not_now(format!("trial {trial} is not in the queue"));
         };
         if attributes::confirms(queued) {
             return not_now(format!("trial {trial} confirms the best; end the repeats instead"));

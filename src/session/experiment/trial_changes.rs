@@ -179,6 +179,7 @@ impl Experiment {
 
     fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
+        self.queue_rerun()?;
         self.study.enqueue(parameters, &origin.attributes())?;
         Ok(self.propose()?)
     }

@@ -90,9 +90,11 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::HandValue(value) => {
             experiment.set_hand_value(*value)?;
+            let accepted = experiment.under_review().is_some_and(|row| row.suggested == Some(Verdict::Accept));
             match value {
                 Some(value) => {
-                    format!("{} {} counts instead of the measured value", six_digits(*value), experiment.unit())
+                    let when = if accepted { "" } else { " if the trial is accepted" };
+                    format!("{} {} counts instead of the measured value{when}", six_digits(*value), experiment.unit())
                 }
                 None => "the measured value counts".to_owned(),
             }

@@ -103,6 +103,8 @@ pub enum Question {
     Skip { trial: u32, revision: u32 },
     /// Accept a trial whose suggested verdict is another, or judge one a fall whose suggested verdict is void.
     JudgeAnyway { trial: u32, verdict: Verdict },
+    /// Queue the parameters of a judged trial again.
+    Rerun { trial: u32 },
     /// Use a value measured by hand that lies far from the robot's own measurement.
     HandValue { trial: u32, value: f64 },
 }

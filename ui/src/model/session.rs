@@ -45,7 +45,8 @@ impl SessionModel {
         self.stage.is_some_and(|info| info.stage == stage)
     }
 
-    fn trial_in(&self, stage: ExperimentStage) -> Option<u32> {
+    /// The trial of the present stage, if that is `stage`.
+    pub fn trial_in(&self, stage: ExperimentStage) -> Option<u32> {
         self.stage.filter(|info| info.stage == stage).map(|info| info.trial)
     }
 

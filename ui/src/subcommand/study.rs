@@ -11,7 +11,7 @@ use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_s
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
-use quadfrog::optimize::trial::{CHANGED_VERDICT, TrialState};
+use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, confirmation_in_words, rows_of};
@@ -156,9 +156,10 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let name = Some(study_name(stored.task, stored.seed));
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
     let trials = opened.study.trials();
-    let counted = rows_of(&opened.study, &opened.parameters).iter().filter(|row| row.counts()).count();
+    let all = opened.rows();
+    let counted = all.iter().filter(|row| row.counts()).count();
     let falls = trials.iter().filter(|trial| trial.is_fall()).count();
-    let best = opened.study.best().and_then(|trial| trial.value);
+    let best = opened.best(&all).and_then(|row| row.value);
     Ok(vec![
         file.parent().unwrap_or(file).display().to_string(),
         stored.task.name().to_owned(),
@@ -173,11 +174,6 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
 /// Attributes that `show` writes as sentences, or that the table says: values of the sampler's model, confirmations, fixed
 /// parameters.
 const OWN_SENTENCES: [&str; 4] = ["confirm", "confirmed", "fixed", "model_best"];
-
-/// Returns the row of the best trial.
-fn best_row<'a>(opened: &Opened, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
-    opened.study.best().and_then(|best| rows.iter().find(|row| row.trial == best.number))
-}
 
 /// Returns the value of an attribute without the syntax of JSON; `between` separates the elements of a list.
 fn in_words(value: &Value, between: &str) -> String {
@@ -223,9 +219,9 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         let _ = writeln!(text, "  {} from {} to {} {}", parameter.name, parameter.low, parameter.high, parameter.unit);
     }
     text.push('\n');
-    let rows: Vec<TrialRecord> = rows_of(study, parameters);
+    let rows = opened.rows();
     let unit = if ours.is_some() { opened.unit() } else { "value" };
-    let best = study.best().map(|best| best.number);
+    let best = opened.best(&rows).map(|best| best.trial);
     text += &match ours {
         Some(_) => table::table(&rows, best, parameters, unit),
         None => table::other_program(study.trials(), best),
@@ -240,8 +236,12 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         let line = format!("landed {stood}/{repeats}, mean {mean:.3} {unit}, std {std:.3}");
         let _ = writeln!(text, "Trials {trials} are one point: {line}");
     }
-    let count = |state: TrialState| study.trials().iter().filter(|trial| trial.state == state).count();
-    let (running, waiting) = (count(TrialState::Running), count(TrialState::Waiting));
+    let unjudged = |trial: &&Trial| experiment::waits_for_verdict(trial);
+    for trial in study.running().filter(unjudged) {
+        let _ = writeln!(text, "Trial {} waits for its verdict", trial.number);
+    }
+    let undecided = |row: &&TrialRecord| row.verdict.is_none() && study.trial(row.trial).is_ok_and(|t| !unjudged(&t));
+    let (running, waiting) = (rows.iter().filter(undecided).count(), study.waiting().count());
     if running + waiting > 0 {
         let _ = writeln!(text, "{running} running, {waiting} queued");
         for queued in study.waiting() {
@@ -252,7 +252,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         }
     }
     text += &best_line(&opened, &rows);
-    let jumps = best_row(&opened, &rows).and_then(|best| best.measured.as_ref()).map(|measured| &measured.jumps);
+    let jumps = opened.best(&rows).and_then(|best| best.measured.as_ref()).map(|measured| &measured.jumps);
     if let (Some(jumps), Some(ours)) = (jumps.filter(|jumps| jumps.len() > 1), ours) {
         text += &table::jumps(jumps, ours.task.unit());
     }
@@ -262,7 +262,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
 
 fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
     let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
-    table::best_line(best_row(opened, rows), opened.study.model_best(), opened.unit(), &units)
+    table::best_line(opened.best(rows), opened.study.model_best(), opened.unit(), &units)
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
@@ -334,7 +334,7 @@ fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> 
         output::text(&best_line(&opened, &rows));
         return Ok(());
     };
-    let (Some(best), Some(ours)) = (best_row(&opened, &rows), &opened.ours) else {
+    let (Some(best), Some(ours)) = (opened.best(&rows), &opened.ours) else {
         return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
     selector.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;

@@ -35,6 +35,10 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         return Vec::new();
     }
     if let Err(reason) = legal(action, model) {
+        // Esc also closes dialogs: once more, it has nothing to close.
+        if action == Action::EndComparison {
+            return Vec::new();
+        }
         let key = model.keymap.key(action);
         say(model, LogLevel::Warning, format!("{key} is not possible: {reason}"));
         // All failed arming checks are shown at once.
@@ -318,9 +322,12 @@ fn void(model: &mut Model, rerun: bool) -> Vec<Effect> {
 fn rerun(model: &mut Model) -> Vec<Effect> {
     match model.session.stage_is(ExperimentStage::Review) {
         true => void(model, true),
+        // Asked: letters of a reason whose field did not open must not queue a jump.
         false => {
-            let trial = model.selected_trial().map(|trial| trial.trial);
-            request(model, OperatorRequest::Rerun { trial })
+            if let Some(trial) = model.selected_trial().map(|trial| trial.trial) {
+                open(model, Dialog::Confirm(Question::Rerun { trial }));
+            }
+            Vec::new()
         }
     }
 }

@@ -29,6 +29,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         Some(Dialog::Confirm(Question::JudgeAnyway { trial, .. })) => {
             model.session.not_to_accept().is_none_or(|row| row.trial != *trial)
         }
+        Some(Dialog::Confirm(Question::Rerun { .. })) => legal(Action::Rerun, model).is_err(),
         Some(Dialog::Confirm(Question::HandValue { trial, .. })) => {
             model.session.under_review().is_none_or(|row| row.trial != *trial)
         }

@@ -371,17 +371,14 @@ fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u
     })
 }
 
-/// Letters of a phase's name that are shown at least, beyond the first one: fewer would run into the next name.
-const SHORT_NAME: usize = 4;
-
 /// A line under charts with the name of each phase of a jump, or its first letter where the phase is narrow: `i--flight--landing`.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
     let columns: Vec<_> = jump_columns(phases, area.width).collect();
     let joined = |a: &(u16, (Role, &str)), b: &(u16, (Role, &str))| a.1.1 == b.1.1 && b.0 == a.0 + 1;
     for run in columns.chunk_by(joined) {
-        let letters = if run.len() > SHORT_NAME { run.len() - 1 } else { 1 };
-        let name: String = run[0].1.1.chars().take(letters).collect();
-        let line = theme.line().repeat(run.len() - name.len());
-        buffer.set_string(area.x + run[0].0, area.y, name + &line, theme.style(Role::Quiet));
+        let name = run[0].1.1;
+        let shown = if run.len() > name.len() { name } else { &name[..1] };
+        let line = theme.line().repeat(run.len() - shown.len());
+        buffer.set_string(area.x + run[0].0, area.y, format!("{shown}{line}"), theme.style(Role::Quiet));
     }
 }

@@ -22,7 +22,7 @@ pub struct NextStep {
     /// The step itself, a sentence.
     pub lead: String,
     /// Keys and their effects.
-    pub others: Vec<(String, &'static str)>,
+    pub others: Vec<(String, String)>,
 }
 
 /// The next possible step.
@@ -42,7 +42,12 @@ fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)
     let others = others
         .iter()
         .filter(|(action, _)| legal(*action, model).is_ok())
-        .map(|(action, text)| (model.keymap.key(*action), *text))
+        .map(|(action, text)| {
+            // In Trials another row may be selected.
+            let undone = model.session.undoable().filter(|_| *action == Action::Undo);
+            let of = undone.map_or(String::new(), |trial| format!(" #{trial}"));
+            (model.keymap.key(*action), format!("{text}{of}"))
+        })
         .collect();
     NextStep { lead: lead.into(), others }
 }
@@ -102,7 +107,8 @@ fn live(model: &Model) -> NextStep {
             let shown =
                 |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
             let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
-            step(lead, model, &[&verdicts[..], &[undo, quit]].concat())
+            let rerun = if review { &[(Action::Rerun, "re-run")][..] } else { &[] };
+            step(lead, model, &[&verdicts[..], rerun, &[undo, quit]].concat())
         }
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
@@ -280,6 +286,9 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Confirm(Question::JudgeAnyway { trial, .. }) => {
             format!("Press y to accept trial #{trial}. Any other key cancels.")
         }
+        Dialog::Confirm(Question::Rerun { trial }) => {
+            format!("Press y to queue trial #{trial} again. Any other key cancels.")
+        }
         Dialog::Confirm(Question::HandValue { .. }) => "Press y to use the value. Any other key cancels.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose, .. } if purpose.is_remark() && model.space_bar_must_stop() => {
@@ -312,10 +321,10 @@ pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
     let theme = &model.theme;
     let next = next_step(model);
     let room = width.saturating_sub(next.lead.chars().count() + 1);
-    let columns = |(key, text): &(String, &str)| key.chars().count() + text.chars().count() + 4;
-    let more = (model.keymap.key(Action::Help), "more");
+    let columns = |(key, text): &(String, String)| key.chars().count() + text.chars().count() + 4;
+    let more = (model.keymap.key(Action::Help), "more".to_owned());
     let mut shown = next.others;
-    let width_of = |shown: &[(String, &'static str)]| shown.iter().map(columns).sum::<usize>();
+    let width_of = |shown: &[(String, String)]| shown.iter().map(columns).sum::<usize>();
     if width_of(&shown) > room {
         // The first key is worth more than the one of the help.
         while shown.len() > 1 && width_of(&shown) + columns(&more) > room {

@@ -137,7 +137,11 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
     let measured = trial.value.or_else(|| session.measured_objective(trial));
     match trial.hand_value.or(measured) {
         Some(value) => {
-            let hand = if trial.hand_value.is_some() { " by hand" } else { "" };
+            let hand = match (trial.hand_value, trial.suggested) {
+                (Some(_), Some(Verdict::Accept)) => " by hand",
+                (Some(_), _) => " by hand, if accepted",
+                (None, _) => "",
+            };
             lines.push(Line::from(vec![
                 label(" J    "),
                 span(theme, Role::Key, format!("{} {}", number(value), session.info.unit)),

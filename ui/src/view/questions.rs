@@ -91,9 +91,19 @@ pub fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec
 pub fn quit(model: &Model) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     if model.robot_is_energised() {
-        lines.push(Line::from("The robot is armed: it will sit down before the program ends."));
+        lines.push(Line::from(match model.session.info.is_hardware() {
+            true => "The robot is armed: it will sit down before the program ends.",
+            false => "The simulation ends as the robot stands; a real robot would sit down first.",
+        }));
     }
-    if let Some(row) = model.session.under_review() {
+    if let Some(trial) = model.session.trial_in(ExperimentStage::Running) {
+        let follows = match model.mode() {
+            Mode::Settle => "it has landed, is measured, and waits until the study is continued (--resume)",
+            Mode::Jump => "the robot lands first; it is void, and its parameters run again",
+            _ => "it does not jump; it is void, and its parameters run again",
+        };
+        lines.push(Line::from(format!("Trial #{trial} is under way: {follows}.")));
+    } else if let Some(row) = model.session.under_review() {
         let by_hand = row.hand_value.is_some();
         let one_of_several = model.session.proposal.as_ref().is_some_and(|proposal| proposal.repeats > 1);
         let follows = match row.suggested {
@@ -118,6 +128,13 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let text = format!("Trial #{trial} is not run; the sampler does not see it. Another proposal follows.");
             let answer = answers(&model.theme, "y", "skip");
             ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
+        }
+        Question::Rerun { trial } => {
+            let text = format!(
+                "The parameters of trial #{trial} wait in the queue and run before the sampler's next proposal."
+            );
+            let answer = answers(&model.theme, "y", "queue");
+            ("Queue it again?", vec![Line::from(text), Line::default(), answer])
         }
         Question::JudgeAnyway { trial, verdict: Verdict::Fall } => {
             let cause = model.session.not_to_accept().map_or("", |row| row.cause.as_str());

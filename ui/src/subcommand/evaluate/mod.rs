@@ -292,11 +292,11 @@ fn best(source: &Source) -> Result<ParameterValues, Failure> {
         let message = format!("--point best: {file} is a study of {holds}, not of {task}; omit --task");
         return Err(Failure::input(message));
     }
+    let rows = opened.rows();
     let best = opened
-        .study
-        .best()
+        .best(&rows)
         .ok_or_else(|| Failure::input(format!("--point best: {} has no trial that landed", file.display())))?;
-    Ok(best.parameters.clone().into())
+    Ok(best.parameters.clone())
 }
 
 /// Returns one run as a line of JSON; `friction` is that of the ground.

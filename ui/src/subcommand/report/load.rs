@@ -10,7 +10,7 @@ use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::session::experiment::{confirmation_in_words, rows_of};
+use quadfrog::session::experiment::confirmation_in_words;
 use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
@@ -71,7 +71,7 @@ fn reported(
 ) -> Result<ReportedStudy, Failure> {
     let (study, ours) = (&opened.study, opened.ours.as_ref());
     let robot = ours.and_then(|ours| description(kept, &ours.robot));
-    let rows = rows_of(study, &opened.parameters);
+    let rows = opened.rows();
     // A trial of a given duration has as many jumps as fit.
     let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len() as u32);
     let jumps = jumps.max().unwrap_or(1);
@@ -93,8 +93,8 @@ fn reported(
         jumps: control.map_or(1, |control| control.jumps).max(jumps),
         f1_hz: control.map_or(0.0, |control| control.f1_hz),
         parameters: opened.parameters.clone(),
+        best: opened.best(&rows).map(|best| best.trial),
         rows,
-        best: study.best().map(|best| best.number),
         confirmation: ours.and_then(|_| confirmation_in_words(study)),
         model_best: study.model_best().map(|best| PredictedTrial {
             trial: best.trial,

@@ -45,7 +45,7 @@ pub(super) fn approve_key(
     if area_asked || waited < APPROVAL_PAUSE {
         if !area_asked {
             let pause_s = APPROVAL_PAUSE.as_secs_f64();
-            say(model, LogLevel::Info, format!("too early: {key} again after {pause_s:.1} s without a press"));
+            say(model, LogLevel::Info, format!("that {key} came within {pause_s:.1} s and did not count"));
         }
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
@@ -100,6 +100,10 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
         }
         Question::JudgeAnyway { verdict: Verdict::Fall, .. } => cancelled(model, "not judged a fall"),
         Question::JudgeAnyway { .. } => cancelled(model, "not accepted"),
+        Question::Rerun { trial } if yes => {
+            request_if_legal(model, Action::Rerun, OperatorRequest::Rerun { trial: Some(*trial) }, "not queued")
+        }
+        Question::Rerun { .. } => cancelled(model, "not queued"),
         Question::HandValue { value, .. } if yes => {
             request_if_legal(model, Action::HandValue, OperatorRequest::HandValue(Some(*value)), "not used")
         }
