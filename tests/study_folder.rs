@@ -92,6 +92,7 @@ fn a_cut_configuration_is_not_the_one_that_ran_last() {
     drop(prepare_folder(&options(other, &study)).unwrap());
     let (number, newest) = newest_config(&study).unwrap();
     assert_eq!(number, 2);
+    assert!(!study.join(".config-2.4711.part").exists(), "what a killed session left is removed");
     // As an earlier version left it on a full disk.
     fs::write(newest.join("safety.toml"), "").unwrap();
     let refusal = check_kept_config(&newest).unwrap_err().to_string();
@@ -114,6 +115,12 @@ fn new_files_are_written_whole_or_not_at_all_and_replace_nothing() {
     assert!(matches!(write_new_files(&new, &[("a.toml", "x = 3")]), Err(ConfigError::Exists { .. })));
     assert_eq!(fs::read_to_string(new.join("a.toml")).unwrap(), "x = 1");
     assert_eq!(fs::read_to_string(new.join("robot/b.toml")).unwrap(), "y = 2");
+    // Regression: in a container each program has the same number, and what a killed one had left was in the way for ever.
+    let left = folder.path().join(format!(".again.{}.part", std::process::id()));
+    fs::create_dir(&left).unwrap();
+    fs::write(left.join("a.toml"), "").unwrap();
+    write_new_files(&folder.path().join("again"), &files).unwrap();
+    assert_eq!(fs::read_to_string(folder.path().join("again/a.toml")).unwrap(), "x = 1");
 }
 
 /// Regression: a lock that was a link had the file to which it leads emptied; one that was a pipe was waited for without end.

@@ -32,6 +32,10 @@ pub fn write_new_files<T: AsRef<Path>, U: AsRef<str>>(
         // Another program may make the same folder at the same time: the first one's stands.
         let part = folder.with_file_name(format!(".{name}.{}.part", std::process::id()));
         let write = || {
+            // A killed program may have left it: in a container each has the same number.
+            if part.is_dir() {
+                fs::remove_dir_all(&part)?;
+            }
             for (name, text) in files {
                 write_new_file(&part.join(name), text.as_ref())?;
             }

@@ -102,8 +102,17 @@ pub struct LockedFolder {
 
 /// Keeps the running configuration in `config/`, or in `config-2/`, ... if the session before ran with another one: the
 /// highest number is the configuration that ran last. The robot's files are in the folder `robot` in it, a folder for
-/// `--model`. A session before that kept none, as of older versions, counts as another one.
+/// `--model`. A session before that kept none, as of older versions, counts as another one. The folder's lock is held: an
+/// unfinished configuration is that of a killed session.
 fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let unfinished = entries.filter(|entry| {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        name.starts_with(".config") && name.ends_with(".part")
+    });
+    // One that cannot be removed is in nobody's way.
+    unfinished.for_each(|entry| drop(std::fs::remove_dir_all(entry.path())));
     let files = kept_files(options);
     let config = match newest_config(folder) {
         None => folder.join("config"),

@@ -2,7 +2,7 @@
 //! depends on.
 
 use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +15,7 @@ use super::study::space_of;
 use crate::config::Config;
 use crate::optimize::prior::{Prior, PriorModel};
 use crate::optimize::space::Space;
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{RobotDescription, read_text_within};
 use crate::session::prior::{PriorPlan, PriorProgress, simulate};
 use crate::trial::{Backend, ParameterInfo, Task};
 
@@ -254,18 +254,7 @@ impl ReadyPrior {
 }
 
 fn read(path: &Path) -> std::io::Result<String> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is not a regular file"));
-    }
-    let mut text = String::new();
-    let read = File::open(path)?.take(LARGEST_PRIOR + 1).read_to_string(&mut text)?;
-    if read as u64 > LARGEST_PRIOR {
-        return Err(std::io::Error::new(
-            std::io::ErrorKind::FileTooLarge,
-            format!("it has more than {LARGEST_PRIOR} bytes, the most for a prior"),
-        ));
-    }
-    Ok(text)
+    read_text_within(path, LARGEST_PRIOR, "a prior")
 }
 
 fn checksum(prior: &Prior) -> u32 {

@@ -280,26 +280,34 @@ impl RobotDescription {
 /// Largest file of a robot or of a configuration, bytes: a hundred times the largest of the repository.
 pub const LARGEST_FILE: u64 = 1 << 20;
 
-/// Reads a text file of at most [`LARGEST_FILE`] bytes.
+/// Reads a text file of a description or configuration, of at most [`LARGEST_FILE`] bytes.
+///
+/// # Errors
+/// As of [`read_text_within`].
+pub fn read_text(file: &Path) -> io::Result<String> {
+    read_text_within(file, LARGEST_FILE, "a description or configuration")
+}
+
+/// Reads a text file of at most `largest` bytes, which is the most for `what`.
 ///
 /// # Errors
 /// The file cannot be read, is not a regular file (a device may have no end), is larger, or is not UTF-8.
-pub fn read_text(file: &Path) -> io::Result<String> {
+pub fn read_text_within(file: &Path, largest: u64, what: &str) -> io::Result<String> {
     let metadata = std::fs::metadata(file)?;
     if !metadata.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
     }
     let too_large = || {
-        let reason = format!("it has more than {LARGEST_FILE} bytes, the most for a description or configuration");
+        let reason = format!("it has more than {largest} bytes, the most for {what}");
         io::Error::new(io::ErrorKind::FileTooLarge, reason)
     };
-    if metadata.len() > LARGEST_FILE {
+    if metadata.len() > largest {
         return Err(too_large());
     }
     let mut text = String::new();
     // The file may grow meanwhile, and some of the system's files have no length.
-    let read = File::open(file)?.take(LARGEST_FILE + 1).read_to_string(&mut text)?;
-    if read as u64 > LARGEST_FILE { Err(too_large()) } else { Ok(text) }
+    let read = File::open(file)?.take(largest + 1).read_to_string(&mut text)?;
+    if read as u64 > largest { Err(too_large()) } else { Ok(text) }
 }
 
 fn read(file: PathBuf) -> Result<String, DescriptionError> {

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 pub use draft::Draft;
-pub use files::{LARGEST_FILE, RobotFiles, read_text};
+pub use files::{LARGEST_FILE, RobotFiles, read_text, read_text_within};
 
 use super::kinematics::LegGeometry;
 use super::{JOINTS, Joints, PerLeg};
