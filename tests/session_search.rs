@@ -546,3 +546,20 @@ fn points_queued_elsewhere_behind_the_proposal_are_seen() {
     assert_eq!(shown(&mut experiment), [10.0, 30.0, 20.0]);
     assert_eq!(experiment.proposal().unwrap().revision, revision, "the proposal stays");
 }
+
+/// Regression: a point whose removal from the queue was cut off by a kill, and which ran later and was interrupted, was void for good.
+#[test]
+fn a_point_whose_removal_was_cut_off_is_queued_again_after_an_interruption() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.enqueue(&[("Fx".into(), 77.0)]).unwrap();
+    // The lines that a killed removal may leave: the verdict, and not the state.
+    study_in(folder.path()).annotate(0, &[("verdict".to_owned(), serde_json::json!("void"))]).unwrap();
+    experiment.refresh().unwrap();
+    let proposal = experiment.proposal().unwrap();
+    experiment.approve(proposal.trial, proposal.revision).unwrap();
+    drop(experiment);
+    let experiment = open(folder.path());
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.parent, value(&experiment, "Fx")), (Some(0), 77.0));
+}

@@ -320,9 +320,10 @@ impl TrialAttributes {
         self.verdict.is_none() && counts
     }
 
-    /// Returns the outcome of a running trial whose verdict was on disk when the program ended; none without a verdict.
+    /// Returns the outcome of a running trial whose verdict was on disk when the program ended; none without a verdict. A verdict
+    /// without a suggestion is that of a removal from the queue that was cut off: the trial has run since.
     pub fn outcome(&self) -> Option<Outcome> {
-        match self.verdict? {
+        match self.verdict.filter(|_| self.suggested.is_some())? {
             Verdict::Void => Some(Outcome::Fail),
             Verdict::Accept | Verdict::Fall => self.value.map(Outcome::Complete),
         }

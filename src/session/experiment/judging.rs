@@ -153,12 +153,16 @@ impl Experiment {
         if value.is_some_and(|value| !value.is_finite()) {
             return not_now("a measured value must be a finite number");
         }
-        if let Some(row) = self.rows.get_mut(&trial) {
-            row.hand_value = value;
-            row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
+        let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
+        let before = row.clone();
+        row.hand_value = value;
+        row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));
+        if let Err(error) = self.keep_measurement() {
+            self.rows.insert(trial, before);
+            return Err(error.into());
         }
         self.publish_row(trial);
-        Ok(self.keep_measurement()?)
+        Ok(())
     }
 
     /// Ends the session during a review: a trial that is to be void by the rules (stopped, or its operator is gone) is void
