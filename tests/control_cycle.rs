@@ -235,3 +235,19 @@ fn a_stop_outlives_an_acknowledgement_of_an_earlier_one() {
     latch.acknowledge(latch.count());
     assert!(!latch.is_set());
 }
+
+/// Regression: a simulated robot that fell onto unfolded legs could not be armed again, because the floor blocked a thigh each time.
+#[test]
+fn a_simulated_robot_that_fell_stands_up_again() {
+    let mut bench = simulated().reach(Mode::Ready);
+    let Command::RunTrial(mut spec, permit) = bench.approved() else { panic!("an approval") };
+    spec.jump = JumpParameters { f0_hz: 1.178, fx_n: 135.9, fz_n: 213.5, ..spec.jump };
+    bench.command(Command::RunTrial(spec, permit));
+    bench.until(Mode::Damped);
+    bench.ticks(3000);
+    bench.command(Command::Acknowledge { stops: 0 });
+    bench.command(bench.arm());
+    assert_eq!(bench.cycle.mode(), Mode::StandUp, "{:?}", bench.refusal());
+    assert!(bench.events.contains(&Event::SetUpright));
+    bench.until(Mode::Ready);
+}

@@ -35,7 +35,7 @@ pub enum Event {
     Mode { from: Mode, to: Mode, cause: TransitionCause, time_ns: u64 },
     /// A trial is over; its ticks can be measured. This tick is the last of `ticks`: a receiver with fewer has lost some.
     TrialEnded { trial: u32, ticks: u64, end: TrialEnd },
-    /// A simulated robot that lay fallen was laid on its belly at the origin, to be armed.
+    /// A simulated robot that lay fallen, or with unfolded legs, was laid on its belly at the origin, to be armed.
     SetUpright,
     /// A command was refused in this mode.
     Refused { command: Command, mode: Mode, because: CommandRefusal },

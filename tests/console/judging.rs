@@ -1,7 +1,7 @@
 //! From the landing to the verdict: the trial on the charts, the countdown, the questions before what cannot be meant.
 
 use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
-use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
+use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
@@ -517,4 +517,17 @@ fn a_value_by_hand_beside_a_suggested_fall_counts_if_accepted() {
     let screen = console.screen(120, 40);
     assert_shows(&screen, &["0.660 m by hand, if accepted"]);
     assert!(!screen.contains("0.000h"), "{screen}");
+}
+
+/// Regression: at 80 columns the reason of a fault was cut, and the next refused key replaced the line that had all of it.
+#[test]
+fn the_reason_of_a_fault_comes_back_after_an_answer() {
+    let mut console = Console::ready();
+    let cause = "FR_thigh blocked: demanded torque -16.7 N m exceeds 11.8 N m".to_owned();
+    console.mode(Mode::Fault);
+    console.record(Record::Transition(Transition { from: Mode::StandUp, to: Mode::Fault, cause: cause.clone() }));
+    console.press(&["g"]);
+    assert_shows(console.said(), &["g is not possible"]);
+    console.wait(6_000);
+    assert_eq!(console.said(), format!("FAULT: {cause}"));
 }

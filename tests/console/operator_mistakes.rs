@@ -156,7 +156,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.send("k");
     session.wait_for(&["Press A to arm"]);
     session.send("A");
-    session.wait_for(&["the simulated robot lay fallen"]);
+    session.wait_for(&["the simulated robot was laid upright and folded"]);
 
     // A re-run; the terminal shrinks and grows meanwhile.
     let trial = jump(&mut session);
@@ -261,7 +261,7 @@ fn another_shell_shows_a_verdict_that_can_still_be_taken_back() {
     let (folder, mut session) = Session::opened((120, 40), &["--trials", "1", "--seed", "3"]);
     let trial = jump(&mut session);
     let recordings = folder.path().join("recordings");
-    let at = recordings.is_dir().then_some(recordings).unwrap_or_else(|| folder.path().to_owned());
+    let at = if recordings.is_dir() { recordings } else { folder.path().to_owned() };
     let study = study(&at);
     let place = study.to_str().expect("a path");
     let show = quadfrog(folder.path(), &["study", "show", place]);

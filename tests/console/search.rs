@@ -336,7 +336,7 @@ fn repeats_are_shown_as_k_of_n_with_their_spread() {
     );
     console.press(&["3"]);
     let screen = console.screen(120, 40);
-    assert!(screen.contains("2/2  0.600 m ±0.012  leads, 96 %"), "{screen}");
+    assert!(screen.contains("2/2 landed  0.600 m ±0.012  leads, 96 %"), "{screen}");
     console.press(&["2", "/", "2", "Enter", "Enter"]);
     let screen = console.screen(80, 24);
     assert!(line_with(&screen, "repeats").contains("2/2 landed, 0.6000 ± 0.0120 m (#2 #4)"), "{screen}");

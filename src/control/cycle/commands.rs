@@ -142,10 +142,14 @@ impl Cycle {
         }
     }
 
-    /// Whether the robot lies in an attitude from which it cannot stand up.
+    /// Whether the robot lies in an attitude, or with its legs in a pose, from which it cannot stand up.
     fn needs_placing(&self) -> bool {
         let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
-        roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad
+        let lying = self.settings.lying_position.iter();
+        let unfolded = self.tick.state.joint_position_rad.iter().zip(lying).any(|(measured_rad, lying_rad)| {
+            (measured_rad - lying_rad).abs() > self.settings.arming.lying_tolerance_rad
+        });
+        roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad || unfolded
     }
 
     /// Places a simulated robot at the origin, feet at the trial's stance. Returns false for a robot that only a person can place.

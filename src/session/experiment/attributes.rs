@@ -373,6 +373,8 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     // A point that was removed from the queue was never begun: it has the values that were given.
     let given = trial.fixed();
     let parameter = |name: &str| trial.parameter(name).or_else(|| value_of(&given, name));
+    // A verdict that can still be taken back has its value already.
+    let judged = trial.state == TrialState::Running && matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall));
     let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
     TrialRecord {
         trial: trial.number,
@@ -380,8 +382,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect(),
         measured: parse(&trial.user_attributes, |_| true),
-        // A verdict that can still be taken back has its value already.
-        value: trial.value.or(kept.value.filter(|_| matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall)))),
+        value: trial.value.or(kept.value.filter(|_| judged)),
         hand_value: kept.hand_value,
         suggested: kept.suggested,
         cause: kept.cause.unwrap_or_default(),

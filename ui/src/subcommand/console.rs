@@ -199,8 +199,8 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let exit = app::run(Feed::live(handle), console)?;
     let recorded = recorder.map(|recorder| recorder.get());
     let recording = recorded.as_ref().map(|status| match status {
-        RecorderStatus { files: 2.., .. } => folder.clone(),
-        RecorderStatus { finished: true, file, .. } => file.clone(),
+        // With the sessions before.
+        RecorderStatus { finished: true, .. } | RecorderStatus { files: 2.., .. } => folder.clone(),
         // With an error the recording keeps the name of one that is written.
         RecorderStatus { file, .. } => part_of(file),
     });

@@ -200,7 +200,9 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let own = |name: &str| ours.is_some() && OWN_SENTENCES.contains(&name);
     let left_out = |name: &str, value: &Value| name.starts_with(CHANGED_VERDICT) || value.is_null() || own(name);
     for (name, value) in study.attributes().iter().filter(|(name, value)| !left_out(name, value)) {
-        let _ = writeln!(text, "  {name}: {}", in_words(value, if name == "bounds" { " to " } else { " " }));
+        let (name, between) =
+            if name == "bounds" { ("bounds changed by the operator", " to ") } else { (&name[..], " ") };
+        let _ = writeln!(text, "  {name}: {}", in_words(value, between));
     }
     if ours.is_some() {
         for (name, fixed) in study.attributes().get("fixed").and_then(Value::as_object).into_iter().flatten() {

@@ -50,6 +50,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Clock(now) => {
             model.clock = now;
             expire_interrupt(model);
+            records::show_fault_again(model);
         }
         Msg::Resize(columns, rows) => {
             model.size = (columns, rows);

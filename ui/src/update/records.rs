@@ -1,5 +1,7 @@
 //! Applies the session's records to the model: rows, the log, the answer to the operator, the bell.
 
+use std::time::Duration;
+
 use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
 use quadfrog::telemetry::Mode;
@@ -14,6 +16,9 @@ use crate::model::log::LogLine;
 use crate::model::trials::RunTime;
 use crate::model::{Model, Notice};
 use crate::settings::BellCause;
+
+/// Time for which an answer replaces the reason of a fault.
+const FAULT_AGAIN: Duration = Duration::from_secs(5);
 
 /// Closes a question that no longer applies: an approval holds for the shown revision and while the robot stands.
 pub(super) fn close_stale_dialog(model: &mut Model) {
@@ -252,6 +257,19 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
         _ => return,
     };
     log(model, time_ns, LogLevel::Info, "trial", text, trial.verdict.is_some());
+}
+
+/// Shows the reason of a latched fault again once an answer that has replaced it was read: the line below has no room for it in a
+/// narrow terminal.
+pub(super) fn show_fault_again(model: &mut Model) {
+    let text = format!("{}: {}", Mode::Fault.name(), model.session.stopped_because);
+    let read = |message: &Notice| message.text == text || model.clock.saturating_sub(message.at) < FAULT_AGAIN;
+    if model.mode() == Mode::Fault
+        && !model.session.stopped_because.is_empty()
+        && !model.message.as_ref().is_some_and(read)
+    {
+        say(model, LogLevel::Error, text);
+    }
 }
 
 fn log(model: &mut Model, time_ns: u64, level: LogLevel, source: &str, text: String, marker: bool) {

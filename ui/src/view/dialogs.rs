@@ -31,7 +31,7 @@ use crate::wrap::{wrap, wrap_all};
 const PALETTE_INDENT: usize = 26;
 
 /// Columns of the queue: number, source and five values.
-const QUEUE_WIDTH: u16 = 90;
+const QUEUE_WIDTH: u16 = MAX_WIDTH;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
@@ -302,14 +302,16 @@ fn by_hand(model: &Model, trial: u32) -> String {
 
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
     let theme = &model.theme;
-    let inner = open_box(frame, area, model, "Actions", area.width.min(MAX_WIDTH), area.height.min(24));
+    let actions = palette(input.value(), model);
+    let title = format!("Actions ({} of {}, Up Down PgUp PgDn)", (selected + 1).min(actions.len()), actions.len());
+    let inner = open_box(frame, area, model, &title, area.width.min(MAX_WIDTH), area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
     frame.render_widget(Line::from(spans), Rect { height: 1, ..inner });
     let list = Rect { y: inner.y + 2, height: inner.height.saturating_sub(2), ..inner };
     let mut lines = Vec::new();
     let mut end_of_selected = 0;
-    for (index, (info, legal)) in palette(input.value(), model).into_iter().enumerate() {
+    for (index, (info, legal)) in actions.into_iter().enumerate() {
         let (key, name) = (model.keymap.key(info.action), info.name);
         let text = match &legal {
             Ok(()) => info.help.to_owned(),
@@ -346,7 +348,10 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
         true => format!("{title} ({}-{} of {}, Up Down)", first + 1, first + room, rows.len()),
         false => title.to_owned(),
     };
-    let inner = open_box(frame, area, model, &title, 66, rows.len() as u16 + 2);
+    // The symbol, two spaces, the border and its margins.
+    let longest = rows.iter().map(|(_, help, _)| name_width + help.chars().count() + 9).max().unwrap_or_default();
+    let width = (longest as u16).clamp(66, MAX_WIDTH).min(area.width);
+    let inner = open_box(frame, area, model, &title, width, rows.len() as u16 + 2);
     for (line, (index, (name, help, on))) in
         rows.iter().enumerate().skip(first).take(usize::from(inner.height)).enumerate()
     {

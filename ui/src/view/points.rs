@@ -17,9 +17,10 @@ pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'s
 fn line(session: &SessionModel, theme: &Theme, point: &PointRecord, width: usize) -> Line<'static> {
     let first = point.trials.first().copied().unwrap_or(0);
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
+    let landed = if width < 40 { "" } else { " landed" };
     let mut spans = vec![
         span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
-        Span::raw(format!("{}/{} ", point.without_fall, point.trials.len())),
+        Span::raw(format!("{}/{}{landed} ", point.without_fall, point.trials.len())),
         Span::raw(format!(" {} {}", number(point.mean), session.info.unit)),
         span(theme, Role::Quiet, spread),
     ];

@@ -140,6 +140,7 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
             let hand = match (trial.hand_value, trial.suggested) {
                 (Some(_), Some(Verdict::Accept)) => " by hand",
                 (Some(_), _) => " by hand, if accepted",
+                (None, Some(Verdict::Void)) => " if accepted",
                 (None, _) => "",
             };
             lines.push(Line::from(vec![

@@ -30,12 +30,17 @@ pub(super) fn chosen_action(model: &Model, key: Key, filter: &str, selected: usi
     (info.action != Action::Arm || legal.is_err()).then_some(info.action)
 }
 
+/// Actions that a key of the palette pages over: fewer than fit where some have two lines.
+const PALETTE_PAGE: usize = 10;
+
 pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
     let rows = palette(input.value(), model);
     match key.code() {
         KeyCode::Esc => return Vec::new(),
         KeyCode::Up => selected = selected.saturating_sub(1),
         KeyCode::Down => selected = (selected + 1).min(rows.len().saturating_sub(1)),
+        KeyCode::PageUp => selected = selected.saturating_sub(PALETTE_PAGE),
+        KeyCode::PageDown => selected = (selected + PALETTE_PAGE).min(rows.len().saturating_sub(1)),
         // Enter never starts motion: `chosen_action` leaves arming, which is confirmed here.
         KeyCode::Enter if rows.get(selected).is_some() => {
             model.dialog = Some(Dialog::Arm { typed: 0, opened_at: model.clock });
