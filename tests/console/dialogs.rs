@@ -299,3 +299,30 @@ fn the_queue_of_a_replay_offers_no_key_that_is_refused() {
     console.update(Msg::Replay(ReplayStatus::default()));
     assert_eq!(console.next_step(), "Up Down choose, Enter closes.");
 }
+
+/// Regression: the list of actions did not page, and nothing said that it goes on.
+#[test]
+fn the_list_of_actions_pages_and_has_a_position() {
+    let mut console = Console::ready();
+    console.press(&[":"]);
+    let count = ACTIONS.len();
+    assert_shows(&console.screen(80, 24), &[&format!("Actions (1 of {count}")]);
+    console.press(&["PgDn"]);
+    assert_shows(&console.screen(80, 24), &[&format!("Actions (11 of {count}")]);
+    console.press(&["PgUp", "PgUp"]);
+    assert_shows(&console.screen(80, 24), &[&format!("Actions (1 of {count}")]);
+    for _ in 0..20 {
+        console.press(&["PgDn"]);
+    }
+    assert_shows(&console.screen(80, 24), &[&format!("Actions ({count} of {count}")]);
+}
+
+/// Regression: in a wide terminal the texts of the series were cut.
+#[test]
+fn the_list_of_series_is_as_wide_as_its_texts() {
+    let mut console = Console::ready();
+    console.press(&["T"]);
+    let screen = console.screen(200, 60);
+    assert_shows(&screen, &["Series of the charts"]);
+    assert!(!words_of_the_dialog(&screen).contains(".."), "{screen}");
+}
