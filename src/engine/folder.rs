@@ -105,14 +105,7 @@ pub struct LockedFolder {
 /// `--model`. A session before that kept none, as of older versions, counts as another one. The folder's lock is held: an
 /// unfinished configuration is that of a killed session.
 fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-    let unfinished = entries.filter(|entry| {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        name.starts_with(".config") && name.ends_with(".part")
-    });
-    // One that cannot be removed is in nobody's way.
-    unfinished.for_each(|entry| drop(std::fs::remove_dir_all(entry.path())));
+    remove_unfinished_configs(folder);
     let files = kept_files(options);
     let config = match newest_config(folder) {
         None => folder.join("config"),
@@ -126,6 +119,17 @@ fn keep_config(options: &Options, folder: &Path) -> Result<(), EngineError> {
         }
     };
     Ok(write_new_files(&config, &files).map(drop)?)
+}
+
+/// Removes the folders of [`write_new_files`] that a killed session has left. Nothing reads them: one that cannot be removed stays.
+fn remove_unfinished_configs(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with(".config") && name.ends_with(".part") {
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 /// Returns the files of the configuration and of the robot by their path in the kept folder.

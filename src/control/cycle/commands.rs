@@ -4,7 +4,9 @@ use super::{Cycle, TickInputs};
 use crate::control::mode::{self, Trigger};
 use crate::control::running_trial::RunningTrial;
 use crate::robot::{Placement, Robot};
-use crate::telemetry::{Command, CommandRefusal, Event, Mode, Permit, TransitionCause, TrialEnd, TrialSpec};
+use crate::telemetry::{
+    ArmingCheck, Command, CommandRefusal, Event, Mode, Permit, TransitionCause, TrialEnd, TrialSpec,
+};
 
 impl Cycle {
     /// Carries out a command, or reports its refusal as an event.
@@ -145,10 +147,8 @@ impl Cycle {
     /// Whether the robot lies in an attitude, or with its legs in a pose, from which it cannot stand up.
     fn needs_placing(&self) -> bool {
         let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
-        let lying = self.settings.lying_position.iter();
-        let unfolded = self.tick.state.joint_position_rad.iter().zip(lying).any(|(measured_rad, lying_rad)| {
-            (measured_rad - lying_rad).abs() > self.settings.arming.lying_tolerance_rad
-        });
+        let folded = self.findings.get(ArmingCheck::LyingDown);
+        let unfolded = folded.is_some_and(|finding| finding.measured > finding.allowed);
         roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad || unfolded
     }
 

@@ -30,9 +30,6 @@ use crate::wrap::{wrap, wrap_all};
 /// Columns before the text of an action: its key and its name.
 const PALETTE_INDENT: usize = 26;
 
-/// Columns of the queue: number, source and five values.
-const QUEUE_WIDTH: u16 = MAX_WIDTH;
-
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let Some(dialog) = &model.dialog else { return };
     match dialog {
@@ -62,11 +59,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
         Dialog::Queue { selected } => {
             // Within the border and its margins.
-            let width = usize::from(area.width.min(QUEUE_WIDTH).saturating_sub(4));
+            let width = usize::from(area.width.min(MAX_WIDTH).saturating_sub(4));
             let lines = queue::lines(model, *selected, width);
             // The selected line stays in sight.
             let scroll = (*selected + 3).saturating_sub(usize::from(area.height));
-            render_lines(frame, area, model, ("Queue", QUEUE_WIDTH, "Up Down"), lines, scroll);
+            render_lines(frame, area, model, ("Queue", MAX_WIDTH, "Up Down"), lines, scroll);
         }
         Dialog::Help { scroll } => {
             let width = area.width.min(MAX_WIDTH);
