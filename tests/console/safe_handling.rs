@@ -51,6 +51,29 @@ fn a_recording_of_a_running_session_is_not_recovered() {
     assert!(study.join("session.mcap").exists() && !part.exists());
 }
 
+/// Regression: a recording that its session still wrote was called damaged, with the advice to recover it.
+#[test]
+fn a_recording_of_a_running_session_is_not_called_damaged() {
+    let program = Program::new();
+    let (mut session, study) = console(&program);
+    let part = study.join("session.mcap.part");
+    assert_shows(&program.text(&["replay", "--check", part.to_str().unwrap()]), &["a session still writes it"]);
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["replay", part.to_str().unwrap()]);
+    let mut replay = Session::run(&program.path("."), SIZE, command);
+    replay.wait_for(&["REPLAY"]);
+    let (status, screen) = quit(&mut replay);
+    assert!(status == 0 && !screen.contains("recover"), "{screen}");
+    // The same file without its session is what a killed program left.
+    let copy = program.path("left.mcap.part");
+    fs::copy(&part, &copy).unwrap();
+    assert_eq!(
+        program.command(&["replay", "--check", copy.to_str().unwrap()]).output().unwrap().status.code(),
+        Some(1)
+    );
+    quit(&mut session);
+}
+
 /// Regression: the console ended with status 0 and named the other file as its recording.
 #[test]
 fn a_console_that_cannot_finish_its_recording_ends_with_status_1() {

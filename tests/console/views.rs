@@ -57,6 +57,25 @@ fn frozen_charts_stand_still_and_every_view_says_for_how_long() {
     console.press(&["1", "z"]);
     let running = console.screen(80, 24);
     assert!(!running.contains("FROZEN") && charts(&running) != charts(&before), "{running}");
+    assert!(running.contains("the charts show the present"), "{running}");
+}
+
+/// Regression: charts that were frozen before stood still through arming, countdown and jump.
+#[test]
+fn an_approval_ends_frozen_charts() {
+    let mut console = Console::ready();
+    console.press(&["z"]);
+    let frozen = console.screen(80, 24);
+    assert!(
+        frozen.contains("the charts are frozen; z shows the present") && frozen.contains("VIEW FROZEN"),
+        "{frozen}"
+    );
+    console.press(&["g"]);
+    console.wait(1_000);
+    assert!(console.screen(80, 24).contains("VIEW FROZEN"), "the question alone");
+    console.press(&["g"]);
+    let approved = console.screen(80, 24);
+    assert!(!approved.contains("VIEW FROZEN"), "{approved}");
 }
 
 #[test]

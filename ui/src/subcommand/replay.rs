@@ -7,7 +7,7 @@ use std::sync::PoisonError;
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
-use quadfrog::engine::{Rejudging, attached_configuration};
+use quadfrog::engine::{Rejudging, attached_configuration, running_session};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::recordings_of;
@@ -77,13 +77,22 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         second = Some(Timeline::open(&of_second)?);
         files.extend(of_second);
     }
-    let repair = |damage: Vec<String>| {
-        let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
-        let files =
-            files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(" and quadfrog recover ");
-        Failure::Other(anyhow!("{}\nquadfrog recover {files} repairs it", damage.collect::<Vec<_>>().join("\n")))
+    // What a session still writes is not damaged by having no end.
+    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
+    let mut cuts = recording.cuts();
+    cuts.extend(second.iter().flat_map(Timeline::cuts));
+    cuts.retain(|cut| written.iter().any(|file| cut.starts_with(&named_in(file))));
+    let damage_of = |mut damage: Vec<String>| {
+        damage.retain(|line| !cuts.contains(line));
+        damage
     };
-    terminal::check().map_err(|error| match recording.damage() {
+    let repair = |damage: Vec<String>| {
+        let damaged = files.iter().filter(|file| damage.iter().any(|line| line.starts_with(&named_in(file))));
+        let commands: Vec<String> = damaged.map(|file| format!("quadfrog recover {}", file.display())).collect();
+        let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
+        Failure::Other(anyhow!("{}\n{} repairs it", damage.collect::<Vec<_>>().join("\n"), commands.join(" and ")))
+    };
+    terminal::check().map_err(|error| match damage_of(recording.damage()) {
         damage if damage.is_empty() => Failure::input(error),
         damage => Failure::Input(format!("{}\n{error}", message(repair(damage)))),
     })?;
@@ -94,7 +103,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     }
     let damage = feed.damage();
     let ended = app::run(feed, console)?;
-    let damage = std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner));
+    let damage = damage_of(std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner)));
     if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
 }
 
@@ -145,7 +154,18 @@ fn check(files: &[PathBuf]) -> Result<(), Failure> {
     }
 }
 
-/// Returns whether a file is whole.
+/// Whether a session that runs in its folder still writes a recording.
+fn is_written(file: &Path) -> bool {
+    let folder = file.parent().unwrap_or(file);
+    file.extension().is_some_and(|extension| extension == "part") && matches!(running_session(folder), Ok(Some(_)))
+}
+
+/// Returns how a line about damage begins that is about `file`.
+fn named_in(file: &Path) -> String {
+    format!("{}: ", file.display())
+}
+
+/// Returns whether a file is whole, or as whole as the session that still writes it has made it.
 fn check_file(file: &Path) -> Result<bool, Failure> {
     let mut player = Player::open(file)?;
     let (mut ticks, mut records) = (0_u64, 0_u64);
@@ -163,6 +183,11 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);
     }
     let damage = player.damage();
+    let cut = player.cut().map(|cut| format!("{}{cut}", named_in(file)));
+    if cut.is_some() && damage == cut && extras.is_empty() && is_written(file) {
+        put_line!("  a session still writes it");
+        return Ok(true);
+    }
     for line in damage.iter().chain(&extras) {
         put_line!("  {line}");
     }

@@ -93,13 +93,15 @@ pub(super) fn freeze(model: &mut Model) {
             return;
         }
     }
-    model.live.frozen = match model.live.frozen.take() {
-        Some(_) => None,
+    let text = match model.live.frozen.take() {
+        Some(_) => "the charts show the present".to_owned(),
         None => {
             model.live.cursor_ns = model.history.newest_ns();
-            Some((model.history.clone(), model.clock))
+            model.live.frozen = Some((model.history.clone(), model.clock));
+            format!("the charts are frozen; {key} shows the present")
         }
     };
+    say(model, LogLevel::Info, text);
 }
 
 pub(super) fn zoom(model: &mut Model, factor: f64) {
