@@ -74,6 +74,30 @@ fn a_recording_of_a_running_session_is_not_called_damaged() {
     quit(&mut session);
 }
 
+/// Regression: what a killed session had left was taken for the file of the session that continues its study.
+#[test]
+fn a_leftover_of_a_killed_session_is_damaged_also_beside_the_session_that_continues() {
+    let program = Program::new();
+    let (mut session, study) = console(&program);
+    let left = study.join("session.mcap.part");
+    let of_killed = fs::read(&left).unwrap();
+    quit(&mut session);
+    fs::remove_file(study.join("session.mcap")).unwrap();
+    fs::write(&left, of_killed).unwrap();
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["--resume", study.to_str().unwrap()]);
+    let mut session = Session::run(&program.path("."), SIZE, command);
+    session.wait_for(&["Press A to arm"]);
+    let written = study.join("session-2.mcap.part");
+    assert_shows(&program.text(&["replay", "--check", written.to_str().unwrap()]), &["a session still writes it"]);
+    // By the name alone, too.
+    let output = program.command(&["replay", "--check", "session-2.mcap.part"]).current_dir(&study).output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let output = program.run(&["replay", "--check", left.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
+    quit(&mut session);
+}
+
 /// Regression: the console ended with status 0 and named the other file as its recording.
 #[test]
 fn a_console_that_cannot_finish_its_recording_ends_with_status_1() {

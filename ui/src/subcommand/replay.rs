@@ -10,7 +10,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{Rejudging, attached_configuration, running_session};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
-use quadfrog::recording::session_files::recordings_of;
+use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog_console::app::{self, ConsoleExit};
@@ -78,10 +78,10 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         files.extend(of_second);
     }
     // What a session still writes is not damaged by having no end.
-    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
+    let written: Vec<String> = files.iter().filter(|file| is_written(file)).map(|file| named_in(file)).collect();
     let mut cuts = recording.cuts();
     cuts.extend(second.iter().flat_map(Timeline::cuts));
-    cuts.retain(|cut| written.iter().any(|file| cut.starts_with(&named_in(file))));
+    cuts.retain(|cut| written.iter().any(|file| cut.starts_with(file)));
     let damage_of = |mut damage: Vec<String>| {
         damage.retain(|line| !cuts.contains(line));
         damage
@@ -154,10 +154,17 @@ fn check(files: &[PathBuf]) -> Result<(), Failure> {
     }
 }
 
-/// Whether a session that runs in its folder still writes a recording.
+/// Whether a session that runs in its folder still writes a recording: the newest there. An older unfinished one is what a
+/// killed session left.
 fn is_written(file: &Path) -> bool {
-    let folder = file.parent().unwrap_or(file);
-    file.extension().is_some_and(|extension| extension == "part") && matches!(running_session(folder), Ok(Some(_)))
+    let folder = match file.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    let newest = recordings_in(folder).pop();
+    file.extension().is_some_and(|extension| extension == "part")
+        && newest.is_some_and(|newest| newest.file_name() == file.file_name())
+        && matches!(running_session(folder), Ok(Some(_)))
 }
 
 /// Returns how a line about damage begins that is about `file`.
