@@ -60,6 +60,17 @@ fn frozen_charts_stand_still_and_every_view_says_for_how_long() {
     assert!(running.contains("the charts show the present"), "{running}");
 }
 
+/// Regression: arming the simulated robot, which no question precedes, left the charts frozen.
+#[test]
+fn arming_ends_frozen_charts() {
+    let mut console = Console::proposed();
+    console.press(&["z"]);
+    assert!(console.screen(80, 24).contains("VIEW FROZEN"));
+    console.press(&["A"]);
+    let armed = console.screen(80, 24);
+    assert!(!armed.contains("VIEW FROZEN"), "{armed}");
+}
+
 /// Regression: charts that were frozen before stood still through arming, countdown and jump.
 #[test]
 fn an_approval_ends_frozen_charts() {

@@ -53,6 +53,10 @@ pub(super) fn refused(model: &mut Model, subject: &str, reason: &str) -> Vec<Eff
 
 /// Sends a request to the session, except in a replay or from an observer.
 pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect> {
+    if matches!(request, OperatorRequest::Arm | OperatorRequest::Approve { .. }) {
+        // Charts of the past beside a robot that moves would be taken for the present.
+        model.live.frozen = None;
+    }
     let allowed = if request == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
     match allowed {
         Ok(()) => vec![Effect::Request(request)],

@@ -73,13 +73,7 @@ pub(super) fn arm_key(model: &mut Model, key: Key, (typed, opened_at): (usize, D
 
 fn request_if_legal(model: &mut Model, action: Action, wanted: OperatorRequest, text: &str) -> Vec<Effect> {
     match legal(action, model) {
-        Ok(()) => {
-            if matches!(action, Action::Arm | Action::Approve) {
-                // Charts of the past beside a robot that moves would be taken for the present.
-                model.live.frozen = None;
-            }
-            request(model, wanted)
-        }
+        Ok(()) => request(model, wanted),
         Err(reason) => refused(model, text, &reason),
     }
 }
