@@ -4,7 +4,7 @@
 //! **Cache warm-up.** The other work of a millisecond evicts the tick's code and data from the processor's caches, and a tick with
 //! cold caches takes longer. Therefore [`ControlLoop::warm_up`], 0.1 ms before each tick of a real robot, runs a tick on a copy of
 //! the cycle with the last state and discards the result; [`Robot::warm_up`] does the same for the system calls of the link. It
-//! changes no result (`tests/control_warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
+//! changes no result (`tests/control/warm_up.rs`). The longest of a thousand ticks take a third less time with it (loopback:
 //! `quadfrog bench loop --with-link`, compared with `--without-warm-up`).
 
 use super::cycle::{Cycle, TickInputs};

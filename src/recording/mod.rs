@@ -34,7 +34,7 @@ pub mod writer;
 
 pub use error::RecordingError;
 
-/// The messages of `proto/frog.proto` as Rust types, made by `tests/messages.rs`.
+/// The messages of `proto/frog.proto` as Rust types, made by `tests/recording/messages.rs`.
 #[allow(missing_docs, clippy::all, reason = "generated; proto/frog.proto documents the fields")]
 mod frog {
     include!("../../proto/generated/messages.rs");

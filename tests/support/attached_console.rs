@@ -31,6 +31,11 @@ impl AttachedConsole {
         }
     }
 
+    /// Waits for at most a minute.
+    pub fn until(&mut self, what: &str, wanted: impl Fn(&AttachedConsole) -> bool) {
+        self.until_within(Duration::from_secs(60), what, wanted);
+    }
+
     pub fn pass(&mut self, time: Duration) {
         let end = Instant::now() + time;
         while Instant::now() < end {

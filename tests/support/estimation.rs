@@ -1,5 +1,5 @@
 //! Jumps with the controller on its own estimate, and the error of that estimate. Shared by
-//! `tests/estimator.rs` and `benches/estimator.rs`.
+//! `tests/control/estimator.rs` and `benches/estimator.rs`.
 #![allow(dead_code, reason = "test and bench each use their own part")]
 
 use nalgebra::Vector2;

@@ -114,7 +114,7 @@ impl Page<'_> {
         let [about, _] = self.comments(&[12]);
         let mut page = String::from(
             "# Messages of a recording\n\n\
-             Made from `proto/frog.proto`; `QUADFROG_WRITE=1 cargo test --test messages` writes it.\n\
+             Made from `proto/frog.proto`; `QUADFROG_WRITE=1 cargo test --test recording messages::` writes it.\n\
              `recordings/README.md` describes the container, its topics and its attachments; each recording has this file inside.\n",
         );
         page += &format!("\n{}\n", about.lines().map(str::trim).collect::<Vec<_>>().join("\n"));

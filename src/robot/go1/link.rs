@@ -217,7 +217,7 @@ mod tests {
 
     const CLOCK: StateClock = StateClock { state_period_ms: 1, restart_ms: 100 };
 
-    /// (`tests/control_warm_up.rs` checks that a warm-up changes nothing.)
+    /// (`tests/control/warm_up.rs` checks that a warm-up changes nothing.)
     #[test]
     fn a_warm_up_sends_an_invalid_datagram_to_itself() {
         let address = (Ipv4Addr::LOCALHOST, 9).into();

@@ -1,0 +1,26 @@
+//! Tests of the controller, its modes and failsafes, and the estimator, as one program: each file is a module.
+
+#[path = "../support/bench.rs"]
+mod bench;
+#[path = "../support/emulated.rs"]
+mod emulated;
+#[path = "../support/estimation.rs"]
+mod estimation;
+#[path = "../support/go1.rs"]
+mod go1;
+#[path = "../support/robots.rs"]
+mod robots;
+
+mod arming;
+mod consistency;
+mod cycle;
+mod estimator;
+mod estimator_late;
+mod failsafe;
+mod force_signs;
+mod landing;
+mod landing_terms;
+mod readiness;
+mod series;
+mod standing;
+mod warm_up;

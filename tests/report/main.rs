@@ -1,0 +1,4 @@
+//! Tests of pages and tables of a report, as one program: each file is a module.
+
+mod pages;
+mod study;

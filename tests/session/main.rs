@@ -1,0 +1,28 @@
+//! Tests of a session: arming, approval, trials, verdicts, folder, as one program: each file is a module.
+
+#[path = "../support/attached_console.rs"]
+mod attached_console;
+#[path = "../support/bench.rs"]
+mod bench;
+#[path = "../support/go1.rs"]
+mod go1;
+#[path = "../support/robots.rs"]
+mod robots;
+#[path = "../support/experiment.rs"]
+mod support;
+
+mod approval;
+mod arming;
+mod backend_change;
+mod effort;
+mod expectation;
+mod experiment;
+mod gains;
+mod limits;
+mod measure;
+mod operator_lost;
+mod repeats;
+mod search;
+mod storage;
+mod study_folder;
+mod suspend_and_guard;

@@ -1,0 +1,563 @@
+//! The operator's changes of the search: gains, fixed parameters, bounds, confirmation of the best, and other programs.
+
+use crate::support;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
+use quadfrog::recording::record::Record;
+use quadfrog::session::experiment::{Experiment, RequestRefusal};
+use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
+use quadfrog::trial::{
+    ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
+};
+use support::{accept, approve, experiment, far, joined, open, plan, run, skip, study_in, ticks};
+
+#[derive(Default)]
+struct News {
+    search: Option<SearchStatus>,
+    insight: Option<ProposalInsight>,
+    points: Vec<PointRecord>,
+    log: Vec<String>,
+}
+
+fn told(experiment: &mut Experiment, told: &mut News) {
+    for record in experiment.take_records() {
+        match record {
+            Record::Search(search) => told.search = Some(search),
+            Record::Insight(insight) => told.insight = Some(insight),
+            Record::Points(points) => told.points = points,
+            Record::Log(line) => told.log.push(line.message),
+            _ => {}
+        }
+    }
+}
+
+fn search(experiment: &mut Experiment) -> SearchStatus {
+    let mut news = News::default();
+    told(experiment, &mut news);
+    news.search.expect("the search has changed")
+}
+
+fn several(experiment: &mut Experiment, trials: usize) {
+    for _ in 0..trials {
+        accept(experiment);
+    }
+}
+
+fn value(experiment: &Experiment, name: &str) -> f64 {
+    experiment.proposal().unwrap().parameters.iter().find(|p| p.name == name).unwrap().value
+}
+
+#[test]
+fn a_gain_is_checked_runs_in_one_trial_alone_and_stays_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let error = experiment.set_gain("kp", 1001.0).unwrap_err().to_string();
+    assert!(error.contains("kp = 1001") && error.contains("100 to 1000"), "{error}");
+    let error = experiment.set_gain("ki", 1.0).unwrap_err().to_string();
+    assert!(error.contains("kp, kd, kd_joint, k_att"), "{error}");
+    assert!(experiment.set_gain("kd", f64::NAN).is_err());
+
+    experiment.set_gain("kp", 500.0).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(proposal.source, ProposalSource::Operator);
+    let kp = &proposal.gains[0];
+    assert_eq!((kp.name.as_str(), kp.value, kp.proposed), ("kp", 500.0, 400.0));
+    let spec = accept(&mut experiment);
+    assert_eq!((spec.gains.kp, spec.gains.kd), (500.0, 8.0));
+    let next = accept(&mut experiment);
+    assert_eq!(next.gains.kp, 400.0, "the next trial has the configured gains again");
+
+    // The table of a later session knows, and a re-run has the same gains.
+    let mut experiment = open(folder.path());
+    let row = experiment.row(spec.trial).unwrap();
+    assert_eq!(row.gains.iter().find(|(name, _)| name == "kp").unwrap().1, 500.0);
+    assert!(row.note.contains("kp 500 (configured 400)"), "{}", row.note);
+    assert!(experiment.row(next.trial).unwrap().note.is_empty());
+    experiment.repeat(spec.trial).unwrap();
+    let again = accept(&mut experiment);
+    assert_eq!((again.jump, again.gains), (spec.jump, spec.gains));
+}
+
+#[test]
+fn changes_of_a_card_are_taken_back_together() {
+    let mut experiment = experiment(5);
+    experiment.set_gain("kp", 500.0).unwrap();
+    experiment.set_parameter("Fx", 100.0).unwrap();
+    experiment.clear_overrides().unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.source, proposal.gains[0].value), (ProposalSource::Sampler, 400.0));
+}
+
+#[test]
+fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_proposed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    several(&mut experiment, 4);
+    experiment.fix("Fx", 60.0, 3).unwrap();
+    assert_eq!(search(&mut experiment).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: 3 }));
+    let mut others = Vec::new();
+    for left in [3, 2, 2, 1] {
+        // Interrupted in between, it goes on.
+        let mut experiment = open(folder.path());
+        assert_eq!(search(&mut experiment).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials: left }));
+        assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler);
+        let spec = run(&mut experiment, TrialEnd::Settled);
+        assert_eq!(spec.jump.fx_n, 60.0);
+        others.push(spec.jump.fz_n);
+        // A void trial uses up none.
+        let verdict = if others.len() == 2 { Verdict::Void } else { Verdict::Accept };
+        experiment.judge(verdict, false).unwrap();
+        experiment.close().unwrap();
+    }
+    others.dedup();
+    assert_eq!(others.len(), 4, "the other parameters are proposed: {others:?}");
+    let mut experiment = open(folder.path());
+    assert_eq!(search(&mut experiment).parameters[1].fixed, None);
+    assert_ne!(value(&experiment, "Fx"), 60.0);
+}
+
+#[test]
+fn a_fixed_parameter_can_be_freed_and_overridden_and_leaves_queued_points_alone() {
+    let mut experiment = experiment(20);
+    experiment.fix("Fx", 60.0, 5).unwrap();
+    experiment.set_parameter("Fx", 70.0).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 70.0);
+    experiment.enqueue(&[("Fx".into(), 80.0)]).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 80.0);
+    assert_eq!(value(&experiment, "Fx"), 60.0);
+    experiment.unfix("Fx").unwrap();
+    assert_ne!(value(&experiment, "Fx"), 60.0);
+    assert!(experiment.unfix("Fx").unwrap_err().to_string().contains("not fixed"));
+    let error = experiment.fix("Fx", 200.0, 1).unwrap_err().to_string();
+    assert!(error.contains("0 to 150"), "{error}");
+    assert!(experiment.fix("Fx", 60.0, 0).is_err());
+    experiment.fix("Fx", 60.0, 2).unwrap();
+    experiment.fix("f0", 1.0, 2).unwrap();
+    let error = experiment.fix("Fz", 200.0, 2).unwrap_err().to_string();
+    assert!(error.contains("nothing would be left"), "{error}");
+}
+
+#[test]
+fn bounds_are_changed_within_what_safety_allows_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    several(&mut experiment, 5);
+    for (low, high, words) in
+        [(110.0, 40.0, "no range"), (0.0, 301.0, "safety.toml allows: 0 to 300"), (0.0, f64::NAN, "")]
+    {
+        let error = experiment.narrow_bounds("Fx", low, high).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    experiment.narrow_bounds("Fx", 40.0, 50.0).unwrap();
+    assert_eq!(value(&experiment, "Fz"), 200.0, "what was set on the proposal stays");
+    experiment.clear_overrides().unwrap();
+    for _ in 0..6 {
+        let mut experiment = open(folder.path());
+        let fx = value(&experiment, "Fx");
+        assert!((40.0..=50.0).contains(&fx), "{fx}");
+        assert!(experiment.set_parameter("Fx", 60.0).is_err());
+        accept(&mut experiment);
+        experiment.close().unwrap();
+    }
+    let mut experiment = open(folder.path());
+    experiment.fix("Fx", 45.0, 1).unwrap();
+    assert!(experiment.narrow_bounds("Fx", 46.0, 50.0).unwrap_err().to_string().contains("fixed at 45"));
+    experiment.unfix("Fx").unwrap();
+    // Wider than configured, though not than safe; and back.
+    experiment.narrow_bounds("Fx", 0.0, 300.0).unwrap();
+    experiment.set_parameter("Fx", 250.0).unwrap();
+    experiment.narrow_bounds("Fx", 0.0, 150.0).unwrap();
+    let now = search(&mut experiment);
+    let fx = &now.parameters[1];
+    assert_eq!((fx.low, fx.high, fx.least, fx.most), (0.0, 150.0, 0.0, 300.0));
+    assert!(value(&experiment, "Fx") <= 150.0, "a value that the bounds exclude does not stay on the proposal");
+}
+
+/// A jump whose length is what its parameters say, plus noise of its seed.
+fn jump(experiment: &mut Experiment, noise: f64) {
+    let spec = approve(experiment);
+    let u = (spec.seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+    experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, far(&spec) + noise * u), 2);
+    experiment.judge(Verdict::Accept, false).unwrap();
+}
+
+#[test]
+fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    assert!(experiment.confirm_best(5).unwrap_err().to_string().contains("nothing to compare"));
+    (0..12).for_each(|_| jump(&mut experiment, 0.02));
+    let counted = experiment.counted();
+    let trials = experiment.confirm_best(60).unwrap();
+    assert_eq!(trials.len(), 3);
+    let mut news = News::default();
+    let mut repeats = 0;
+    loop {
+        told(&mut experiment, &mut news);
+        if news.search.as_ref().unwrap().confirming.is_none() {
+            break;
+        }
+        assert_eq!(news.search.as_ref().unwrap().confirming, Some(60 - repeats));
+        let proposal = experiment.proposal().unwrap();
+        assert_eq!(proposal.source, ProposalSource::Confirm);
+        assert!(trials.contains(&proposal.parent.unwrap()));
+        jump(&mut experiment, 0.02);
+        repeats += 1;
+        // Ended and taken up again in between: that costs nothing.
+        told(&mut experiment, &mut news);
+        experiment.close().unwrap();
+        experiment = open(folder.path());
+    }
+    assert!((6..60).contains(&repeats), "each is run three times at least: {repeats}");
+    assert_eq!(experiment.counted(), counted, "repeats are beyond the budget");
+    let leader: Vec<_> = news.points.iter().filter(|point| point.confidence.is_some()).collect();
+    assert_eq!(leader.len(), 1);
+    assert!(leader[0].contender && leader[0].confidence.unwrap() >= 0.95 && leader[0].deviation.unwrap() > 0.0);
+    assert_eq!(leader[0].without_fall as usize, leader[0].trials.len());
+    assert_eq!(news.points.iter().filter(|point| point.contender).count(), 3);
+    let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
+    assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
+}
+
+#[test]
+fn repeats_end_with_their_budget_or_when_they_are_called_off() {
+    let mut experiment = experiment(6);
+    (0..6).for_each(|_| jump(&mut experiment, 0.02));
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    experiment.confirm_best(4).unwrap();
+    let mut news = News::default();
+    for _ in 0..4 {
+        assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+        jump(&mut experiment, 50.0);
+    }
+    told(&mut experiment, &mut news);
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    assert!(news.log.iter().any(|line| line.contains("used up") && line.contains("short of 95 %")), "{:?}", news.log);
+    experiment.confirm_best(4).unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+    assert!(experiment.confirm_best(0).unwrap().is_empty());
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("no confirmation of the best is running"));
+}
+
+/// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.
+#[test]
+fn the_verdict_that_ended_a_confirmation_can_be_undone() {
+    let mut experiment = experiment(6);
+    several(&mut experiment, 6);
+    experiment.confirm_best(40).unwrap();
+    let mut news = News::default();
+    while experiment.stage() == ExperimentStage::Proposed {
+        accept(&mut experiment);
+    }
+    told(&mut experiment, &mut news);
+    assert!(news.log.iter().any(|line| line.starts_with("confirmed")));
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Void, false).unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Proposed, "one repeat is missing again");
+    accept(&mut experiment);
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+}
+
+#[test]
+fn a_proposal_comes_with_its_densities_and_what_matters() {
+    let mut experiment = experiment(40);
+    let mut news = News::default();
+    for _ in 0..IMPORTANCE_TRIALS - 1 {
+        accept(&mut experiment);
+    }
+    told(&mut experiment, &mut news);
+    assert!(news.insight.as_ref().unwrap().parameters.iter().all(|p| p.importance.is_none()));
+    several(&mut experiment, 5);
+    told(&mut experiment, &mut news);
+    let insight = news.insight.unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(insight.trial, proposal.trial);
+    let shares: f64 = insight.parameters.iter().filter_map(|p| p.importance).sum();
+    assert!((shares - 1.0).abs() < 1e-12, "{shares}");
+    let bounds: BTreeMap<&str, (f64, f64)> = support::BOUNDS.iter().map(|(n, low, high)| (*n, (*low, *high))).collect();
+    for (parameter, proposed) in insight.parameters.iter().zip(&proposal.parameters) {
+        assert_eq!((&parameter.name, parameter.proposed), (&proposed.name, proposed.proposed));
+        let (low, high) = bounds[parameter.name.as_str()];
+        assert_eq!((parameter.at[0], *parameter.at.last().unwrap()), (low, high));
+        // Both are densities over the range.
+        let step = (high - low) / (parameter.at.len() - 1) as f64;
+        for density in [&parameter.good, &parameter.bad] {
+            let mass = step * (density.iter().sum::<f64>() - (density[0] + density.last().unwrap()) / 2.0);
+            assert!((mass - 1.0).abs() < 0.02, "{}: {mass}", parameter.name);
+        }
+    }
+}
+
+/// Another program (a dashboard, Python, `quadfrog study enqueue`) queues a point while a proposal is on the table.
+#[test]
+fn a_point_queued_by_another_program_comes_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    let mut other = study_in(folder.path());
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    experiment.refresh().unwrap();
+    assert_eq!((experiment.proposal().unwrap().source, value(&experiment, "Fx")), (ProposalSource::Queued, 77.0));
+    // Not over the operator's head.
+    let mut other = study_in(folder.path());
+    accept(&mut experiment);
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    other.enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
+    experiment.refresh().unwrap();
+    assert_eq!(value(&experiment, "Fz"), 200.0);
+    assert_eq!(accept(&mut experiment).jump.fz_n, 200.0);
+    assert_eq!(value(&experiment, "Fx"), 78.0);
+}
+
+/// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.
+fn rerun_beside_a_queued_point(folder: &Path) -> (Experiment, TrialSpec) {
+    let mut experiment = open(folder);
+    let spec = run(&mut experiment, TrialEnd::Fell(FallCause::BodyContact));
+    experiment.judge(Verdict::Void, true).unwrap();
+    let mut other = study_in(folder);
+    other.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    (experiment, spec)
+}
+
+/// (A danger once: a re-run waits in a fork of the study, and another program may take the number that it has there.)
+#[test]
+fn a_rerun_runs_its_own_parameters_though_another_program_queues_a_point_at_the_same_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut experiment, spec) = rerun_beside_a_queued_point(folder.path());
+    let again = accept(&mut experiment);
+    assert_eq!(again.jump, spec.jump);
+    assert_eq!(experiment.row(again.trial).unwrap().parent, Some(spec.trial));
+    assert_eq!(value(&experiment, "Fx"), 77.0);
+}
+
+/// Regression: seen now and then, as a session looks, the point took the re-run's parameters and was lost.
+#[test]
+fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut experiment, spec) = rerun_beside_a_queued_point(folder.path());
+    experiment.refresh().unwrap();
+    let both = [accept(&mut experiment), accept(&mut experiment)];
+    let of = |fx: f64| both.iter().find(|spec| spec.jump.fx_n == fx);
+    assert!(of(77.0).is_some(), "the queued point is lost: {both:?}");
+    let again = of(spec.jump.fx_n).expect("the re-run is lost");
+    assert_eq!((again.jump, experiment.row(again.trial).unwrap().parent), (spec.jump, Some(spec.trial)));
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
+}
+
+/// (A danger once: it ran, with whatever it said.)
+#[test]
+fn a_point_of_another_program_beyond_the_limits_cannot_run() {
+    for (parameters, gains, word) in [
+        (vec![("Fx", 900.0)], None, "Fx = 900"),
+        (vec![("f0", 0.0)], None, "f0 = 0"),
+        (vec![("Fx", 50.0)], Some(9999.0), "kp = 9999"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = open(folder.path());
+        let mut other = study_in(folder.path());
+        let point: Vec<_> = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let attributes: Vec<_> =
+            gains.map(|kp| ("gains".to_owned(), serde_json::json!({ "kp": kp }))).into_iter().collect();
+        other.enqueue(&point, &attributes).unwrap();
+        experiment.refresh().unwrap();
+        let proposal = experiment.proposal().unwrap();
+        let refusal = experiment.approve(proposal.trial, proposal.revision).unwrap_err().to_string();
+        assert!(refusal.contains(word), "{refusal}");
+        skip(&mut experiment);
+        let row = experiment.row(proposal.trial).unwrap();
+        assert!(row.verdict == Some(Verdict::Void) && row.cause.contains(word), "{row:?}");
+        let next = accept(&mut experiment);
+        assert!(next.jump.fx_n <= 200.0 && next.jump.f0_hz > 0.0 && next.gains.kp == 400.0);
+    }
+}
+
+#[test]
+fn gains_that_a_queued_point_brings_are_seen_on_its_card() {
+    let mut experiment = experiment(5);
+    experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 500.0)]).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!(
+        (proposal.gains[0].value, proposal.gains[0].proposed, proposal.source),
+        (500.0, 400.0, ProposalSource::Queued)
+    );
+    assert_eq!(accept(&mut experiment).gains.kp, 500.0);
+    let refusal = experiment.enqueue(&[("Fx".into(), 60.0), ("kp".into(), 5000.0)]).unwrap_err().to_string();
+    assert!(refusal.contains("kp = 5000"), "{refusal}");
+}
+
+/// Regression: the refused request had reported the verdict, which could then not be undone.
+#[test]
+fn a_confirmation_that_is_refused_tells_nothing() {
+    let mut experiment = experiment(5);
+    accept(&mut experiment);
+    assert!(experiment.confirm_best(10).is_err(), "one point is nothing to compare");
+    experiment.undo().unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Review);
+}
+
+#[test]
+fn a_verdict_against_the_suggestion_says_so_until_it_is_undone() {
+    let mut experiment = experiment(5);
+    let spec = run(&mut experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Fall, false).unwrap();
+    let cause = &experiment.row(spec.trial).unwrap().cause;
+    assert_eq!(cause, "by the operator; looked like accept: landed and settled");
+    experiment.undo().unwrap();
+    assert_eq!(experiment.row(spec.trial).unwrap().cause, "landed and settled");
+}
+
+/// Regression: each worker counted only the repeats that were complete, and all queued the last one.
+#[test]
+fn workers_together_run_no_more_repeats_than_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut first = Experiment::open(plan(6), study_in(folder.path())).unwrap();
+    several(&mut first, 6);
+    first.confirm_best(1).unwrap();
+    let mut second = joined(folder.path(), 6, Duration::from_secs(3600));
+    let seen = second.proposal().unwrap();
+    assert_eq!(seen.source, ProposalSource::Confirm);
+    run(&mut first, TrialEnd::Stopped);
+    let refused = second.approve(seen.trial, seen.revision);
+    assert!(matches!(refused, Err(RequestRefusal::Overtaken(_))), "{refused:?}");
+    assert!(second.proposal().is_none() && second.others_run(), "the only repeat runs already");
+    // The trial is abandoned; the first worker that sees this queues it again.
+    first.judge(Verdict::Void, false).unwrap();
+    first.close().unwrap();
+    second.refresh().unwrap();
+    assert_eq!(second.proposal().unwrap().source, ProposalSource::Confirm);
+    accept(&mut second);
+    let late = first.proposal().unwrap();
+    assert!(matches!(first.approve(late.trial, late.revision), Err(RequestRefusal::Overtaken(_))));
+    second.close().unwrap();
+    first.refresh().unwrap();
+    assert_eq!((first.stage(), second.stage()), (ExperimentStage::Finished, ExperimentStage::Finished));
+    let study = study_in(folder.path());
+    let repeats = study.trials().iter().filter(|trial| trial.user_attributes["source"] == "confirm");
+    let completed: Vec<bool> = repeats.map(|trial| trial.value.is_some()).collect();
+    assert_eq!(completed, [false, true]);
+}
+
+/// Regression: the values that the operator had given to one queued point were given to the point that took its place.
+#[test]
+fn an_override_stays_with_its_queued_point() {
+    let fx = |experiment: &Experiment| value(experiment, "Fx");
+    let overridden = |experiment: &Experiment| {
+        let proposal = experiment.proposal().unwrap();
+        proposal.parameters.iter().filter(|p| p.value != p.proposed).map(|p| (p.name.clone(), p.value)).collect()
+    };
+    let mut experiment = experiment(20);
+    for fx_n in [10.0, 20.0, 30.0] {
+        experiment.enqueue(&[("Fx".into(), fx_n), ("Fz".into(), 300.0)]).unwrap();
+    }
+    let fz: Vec<(String, f64)> = vec![("Fz".into(), 200.0)];
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    // Behind the proposal.
+    experiment.move_queued(2, true).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, fz));
+    // The proposal itself.
+    experiment.move_queued(0, false).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (30.0, Vec::new()));
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    experiment.remove_queued(0).unwrap();
+    assert_eq!((fx(&experiment), overridden(&experiment)), (10.0, Vec::new()));
+    // Its row still says which point it was.
+    let removed = experiment.rows().find(|row| row.trial == 0).unwrap();
+    assert_eq!(removed.parameters.get("Fx"), Some(30.0));
+}
+
+/// A journal that ends at any byte of a change, as that of a killed program may: each point waits once, or is removed.
+#[test]
+fn a_change_of_the_queue_that_was_cut_off_loses_and_doubles_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = |folder: &Path| std::fs::read(folder.join("study.log")).unwrap();
+    let mut experiment = open(folder.path());
+    for (fx_n, gain) in [(10.0, None), (20.0, Some(500.0)), (30.0, None)] {
+        let gain = gain.map(|kp| ("kp".to_owned(), kp));
+        experiment.enqueue(&[("Fx".to_owned(), fx_n)].into_iter().chain(gain).collect::<Vec<_>>()).unwrap();
+    }
+    let begin = journal(folder.path()).len();
+    experiment.move_queued(2, true).unwrap();
+    experiment.move_queued(0, false).unwrap();
+    experiment.remove_queued(0).unwrap();
+    let whole = journal(folder.path());
+    drop(experiment);
+    let mut seen: Vec<Vec<(f64, bool)>> = Vec::new();
+    for end in begin..=whole.len() {
+        let cut = tempfile::tempdir().unwrap();
+        std::fs::write(cut.path().join("study.log"), &whole[..end]).unwrap();
+        let mut later = open(cut.path());
+        let queue = search(&mut later).queue;
+        let points: Vec<_> = queue
+            .iter()
+            .map(|point| (point.parameters.get("Fx").unwrap(), point.gains.get("kp") == Some(500.0)))
+            .collect();
+        if seen.last() != Some(&points) {
+            seen.push(points);
+        }
+    }
+    let [a, b, c] = [(10.0, false), (20.0, true), (30.0, false)];
+    assert_eq!(seen, [vec![a, b, c], vec![a, c, b], vec![c, a, b], vec![a, b]]);
+}
+
+/// Regression: a point that was queued while the last verdict could be taken back took the number of the re-run that was proposed.
+#[test]
+fn a_point_queued_after_a_rerun_comes_behind_it() {
+    let mut experiment = experiment(20);
+    let spec = run(&mut experiment, TrialEnd::Fell(FallCause::BodyContact));
+    experiment.judge(Verdict::Void, true).unwrap();
+    let proposed = experiment.proposal().unwrap();
+    experiment.enqueue(&[("Fx".into(), 77.0)]).unwrap();
+    let now = experiment.proposal().unwrap();
+    assert_eq!((now.trial, now.source, now.parent), (proposed.trial, ProposalSource::Rerun, Some(spec.trial)));
+    let queue: Vec<u32> = search(&mut experiment).queue.iter().map(|point| point.trial).collect();
+    assert_eq!(queue, [proposed.trial, proposed.trial + 1]);
+    assert!(experiment.undo().is_err(), "the verdict is final with its re-run in the queue");
+    // The re-run can be removed like any other point, also at once.
+    experiment.remove_queued(proposed.trial).unwrap();
+    assert_eq!(value(&experiment, "Fx"), 77.0);
+}
+
+/// Regression: of points that another program queued behind the proposal a session showed none before its next jump.
+#[test]
+fn points_queued_elsewhere_behind_the_proposal_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let mut other = study_in(folder.path());
+    for fx_n in [10.0, 20.0, 30.0] {
+        other.enqueue(&[("Fx".into(), fx_n)], &[]).unwrap();
+        experiment.refresh().unwrap();
+    }
+    assert_eq!(value(&experiment, "Fx"), 10.0);
+    let shown = |experiment: &mut Experiment| -> Vec<f64> {
+        search(experiment).queue.iter().filter_map(|point| point.parameters.get("Fx")).collect()
+    };
+    assert_eq!(shown(&mut experiment), [10.0, 20.0, 30.0]);
+    other.exchange_waiting(1, 2).unwrap();
+    let revision = experiment.proposal().unwrap().revision;
+    experiment.refresh().unwrap();
+    assert_eq!(shown(&mut experiment), [10.0, 30.0, 20.0]);
+    assert_eq!(experiment.proposal().unwrap().revision, revision, "the proposal stays");
+}
+
+/// Regression: a point whose removal from the queue was cut off by a kill, and which ran later and was interrupted, was void for good.
+#[test]
+fn a_point_whose_removal_was_cut_off_is_queued_again_after_an_interruption() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.enqueue(&[("Fx".into(), 77.0)]).unwrap();
+    // The lines that a killed removal may leave: the verdict, and not the state.
+    study_in(folder.path()).annotate(0, &[("verdict".to_owned(), serde_json::json!("void"))]).unwrap();
+    experiment.refresh().unwrap();
+    let proposal = experiment.proposal().unwrap();
+    experiment.approve(proposal.trial, proposal.revision).unwrap();
+    drop(experiment);
+    let experiment = open(folder.path());
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.parent, value(&experiment, "Fx")), (Some(0), 77.0));
+}
