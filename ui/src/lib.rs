@@ -1,6 +1,7 @@
 //! The terminal console of the operator: draws the state of the engine and sends requests to it; decides nothing.
 //!
-//! One loop (`app`) folds keys and feed into the [`model::Model`] with X//! it, and draws it with free functions ([`view::render`]).
+//! One loop (`app`) folds keys and feed into the [`model::Model`] ([`update::update`]) and draws it with free functions
+//! ([`view::render`]). The command line is [`subcommand`].
 //!
 //! ```text
 //! keys, signals ──┐                      ┌── effects: requests, STOP, bell, quit ──> app ──> engine
@@ -29,6 +30,7 @@ mod picture;
 pub mod screenshot;
 pub mod series;
 pub mod settings;
+pub mod subcommand;
 pub mod terminal;
 pub mod text;
 pub mod theme;

@@ -3,14 +3,12 @@
 //! Exit status: 0 when done, 2 for unusable input (the message names it and the remedy), 1 for every other error.
 #![warn(clippy::print_stdout, clippy::print_stderr)] // every text crosses the border of `output`
 
-mod subcommand;
-
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser};
 use quadfrog_console::output;
-use subcommand::{Arguments, Failure, VERSION};
+use quadfrog_console::subcommand::{self, Arguments, Failure, VERSION};
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|info| output::message(&defect_report(&info.to_string()))));

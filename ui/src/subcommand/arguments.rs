@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::notice;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap_complete::ArgValueCandidates;
@@ -11,7 +12,6 @@ use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::Network;
 use quadfrog::trial::Task;
-use quadfrog_console::notice;
 
 use super::completion;
 use super::failure::Failure;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::output;
 use anyhow::Context as _;
 use clap::Args;
 use clap_complete::ArgValueCandidates;
@@ -10,7 +11,6 @@ use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::session::ask_tell::AskTell;
 use quadfrog::trial::{Backend, Task};
-use quadfrog_console::output;
 
 use super::arguments;
 use super::completion;

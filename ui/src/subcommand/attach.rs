@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::app;
+use crate::feed::Feed;
+use crate::{notice, output, terminal};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
@@ -9,9 +12,6 @@ use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, fi
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::report::table;
-use quadfrog_console::app;
-use quadfrog_console::feed::Feed;
-use quadfrog_console::{notice, output, terminal};
 
 use super::arguments;
 use super::completion;

@@ -5,6 +5,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use crate::output;
 use anyhow::Context as _;
 use clap::{Args, Command, ValueEnum};
 use clap_complete::env::{Bash, EnvCompleter, Fish, Zsh};
@@ -14,7 +15,6 @@ use quadfrog::engine::{RunningSession, STUDY_FILE, find_sessions, open_stored, s
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::Trial;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::output;
 
 use super::failure::Failure;
 

@@ -3,6 +3,15 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
+use crate::app::{self, ConsoleExit, ConsoleOptions};
+use crate::connection::TerminalLocation;
+use crate::feed::Feed;
+use crate::graphics::GraphicsChoice;
+use crate::model::RobotFacts;
+use crate::put_line;
+use crate::settings::ConsoleSettings;
+use crate::terminal;
+use crate::theme::{ColourChoice, ThemeChoice};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -15,15 +24,6 @@ use quadfrog::recording::session_files::recordings_in;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::{HardwareError, Network};
 use quadfrog::trial::{Approval, Backend, Task};
-use quadfrog_console::app::{self, ConsoleExit, ConsoleOptions};
-use quadfrog_console::connection::TerminalLocation;
-use quadfrog_console::feed::Feed;
-use quadfrog_console::graphics::GraphicsChoice;
-use quadfrog_console::model::RobotFacts;
-use quadfrog_console::put_line;
-use quadfrog_console::settings::ConsoleSettings;
-use quadfrog_console::terminal;
-use quadfrog_console::theme::{ColourChoice, ThemeChoice};
 
 use super::arguments::{self, DEFAULT_MODEL, DdsArguments, RealRobot, StudyArguments, one_of};
 use super::completion;

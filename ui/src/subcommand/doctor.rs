@@ -6,6 +6,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::connection::TerminalLocation;
+use crate::put_line;
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
@@ -13,8 +15,6 @@ use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
 use quadfrog::session::parallel;
 use quadfrog::trial::Backend;
-use quadfrog_console::connection::TerminalLocation;
-use quadfrog_console::put_line;
 
 use super::arguments;
 use super::failure::Failure;

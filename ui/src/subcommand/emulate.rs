@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::{notice, put, put_line};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -18,7 +19,6 @@ use quadfrog::robot::CONTROL_PERIOD_S;
 use quadfrog::robot::go2::network::Go2Network;
 use quadfrog::robot::hardware::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
-use quadfrog_console::{notice, put, put_line};
 
 use super::arguments::{self, DdsArguments, RealRobot, load_model, one_of};
 use super::completion;

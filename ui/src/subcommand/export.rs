@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use crate::{notice, output};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCandidates;
@@ -11,7 +12,6 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
-use quadfrog_console::{notice, output};
 
 use super::arguments::one_of;
 use super::completion;
@@ -55,7 +55,7 @@ pub struct ExportArguments {
     #[arg(long, value_name = "A..B", value_parser = parse_times)]
     time: Option<(u64, u64)>,
     /// Export the signals of one topic [default: all]
-    #[arg(long, value_name = "TOPIC", value_parser = one_of(SignalTopic::ALL.map(|topic| (topic, topic.name(), ""))))]
+    #[arg(long, value_name = "TOPIC", value_parser = one_of(SignalTopic::ALL.map(|topic| (topic, topic.name(), topic.about()))))]
     topic: Option<SignalTopic>,
     /// Format of the table [default: by the file's name; csv on standard output]
     #[arg(long, value_name = "FORM", value_parser = table_format())]

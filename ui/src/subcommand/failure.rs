@@ -1,11 +1,11 @@
 //! The error of a command and its exit status.
 
+use crate::notice;
 use quadfrog::config::ConfigError;
 use quadfrog::engine::EngineError;
 use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::study::StudyError;
 use quadfrog::recording::RecordingError;
-use quadfrog_console::notice;
 
 /// The reason for which a command ends before it is done.
 pub enum Failure {
@@ -16,6 +16,7 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// Unusable input, with a message that names it and the remedy.
     pub fn input(message: impl ToString) -> Failure {
         Failure::Input(message.to_string())
     }

@@ -1,8 +1,8 @@
 //! `quadfrog give-back`: starts the robot's own controller again, which a session on hardware has released.
 
+use crate::put_line;
 use clap::Args;
 use clap_complete::ArgValueCandidates;
-use quadfrog_console::put_line;
 
 use super::arguments::{self, DdsArguments, RealRobot};
 use super::completion;

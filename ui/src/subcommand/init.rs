@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::put_line;
 use clap::Args;
 use quadfrog::config::{Config, write_new_files};
 use quadfrog::robot::description::{Draft, read_text};
 use quadfrog::trial::{Backend, Task};
-use quadfrog_console::put_line;
 
 use super::arguments::load_config;
 use super::failure::Failure;

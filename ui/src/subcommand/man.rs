@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::put_line;
 use anyhow::Context as _;
 use clap::{Args, Command};
-use quadfrog_console::put_line;
 
 use super::failure::Failure;
 

@@ -32,11 +32,11 @@ mod verify;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
+use crate::output;
 pub use arguments::VERSION;
 pub use completion::answer_shell;
 pub use failure::Failure;
 use quadfrog::optimize::journal::notice_waits;
-use quadfrog_console::output;
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///
@@ -105,6 +105,10 @@ enum Subcommands {
     Report(report::ReportArguments),
 }
 
+/// Carries out a command line.
+///
+/// # Errors
+/// Unusable input, or the reason for which the command ended before it was done.
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     // While the console has the screen it shows the waits there.
     notice_waits(Some(Box::new(output::notice)));

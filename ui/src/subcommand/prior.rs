@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use crate::{notice, output, put_line};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -15,7 +16,6 @@ use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::cores;
 use quadfrog::session::prior::{PriorProgress, ensemble};
 use quadfrog::trial::Task;
-use quadfrog_console::{notice, output, put_line};
 use serde_json::json;
 
 use super::arguments;

@@ -3,10 +3,10 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
+use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EngineError, running_session};
 use quadfrog::recording::{RecordingError, recover};
-use quadfrog_console::put_line;
 
 use super::failure::Failure;
 

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::session::rejudge::Judgement;
 use quadfrog::trial::Verdict;
-use quadfrog_console::put_line;
 use serde_json::{Value, json};
 
 use super::arguments;

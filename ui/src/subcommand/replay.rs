@@ -4,6 +4,10 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
+use crate::app::{self, ConsoleExit};
+use crate::feed::Feed;
+use crate::model::RobotFacts;
+use crate::{put_line, terminal};
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
@@ -13,10 +17,6 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
-use quadfrog_console::app::{self, ConsoleExit};
-use quadfrog_console::feed::Feed;
-use quadfrog_console::model::RobotFacts;
-use quadfrog_console::{put_line, terminal};
 
 use super::arguments;
 use super::console::{ScreenArguments, options};

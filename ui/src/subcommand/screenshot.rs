@@ -3,18 +3,18 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use crate::feed::Feed;
+use crate::keymap::Key;
+use crate::message::{Effect, Msg, ReplayCommand};
+use crate::model::Model;
+use crate::output;
+use crate::screenshot::Film;
+use crate::settings::ConsoleSettings;
+use crate::theme::{Colours, Glyphs, Theme, ThemeChoice};
+use crate::update::update;
 use clap::Args;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
-use quadfrog_console::feed::Feed;
-use quadfrog_console::keymap::Key;
-use quadfrog_console::message::{Effect, Msg, ReplayCommand};
-use quadfrog_console::model::Model;
-use quadfrog_console::output;
-use quadfrog_console::screenshot::Film;
-use quadfrog_console::settings::ConsoleSettings;
-use quadfrog_console::theme::{Colours, Glyphs, Theme, ThemeChoice};
-use quadfrog_console::update::update;
 
 use super::arguments;
 use super::console::{settings, theme};

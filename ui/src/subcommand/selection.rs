@@ -3,11 +3,11 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use crate::notice;
 use quadfrog::engine::{EngineError, STUDY_FILE, StoredStudy, stored_studies, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
-use quadfrog_console::notice;
 
 use super::failure::Failure;
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use crate::{notice, output};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use clap_complete::ArgValueCandidates;
@@ -17,7 +18,6 @@ use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, confirmation_in_words, rows_of};
 use quadfrog::session::operator_request::counted;
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
-use quadfrog_console::{notice, output};
 use serde_json::Value;
 
 use super::completion;

@@ -3,12 +3,12 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use crate::put_line;
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::engine::{self, TickDifference, Verification, VerifyError};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::session_files::recordings_of;
-use quadfrog_console::put_line;
 
 use super::failure::Failure;
 

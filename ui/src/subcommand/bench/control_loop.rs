@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::{put, put_line};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use quadfrog::config::Config;
@@ -24,7 +25,6 @@ use quadfrog::sim::Simulator;
 use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{Backend, Task};
-use quadfrog_console::{put, put_line};
 
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::subcommand::failure::Failure;

@@ -13,8 +13,8 @@ use quadfrog::realtime::scheduling::Scheduling;
 use quadfrog::realtime::thread::{CONTROL_TICK_OFFSET, PeriodicTask, TickStart, pace_with_warm_up};
 use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 
+use crate::put_line;
 use crate::subcommand::failure::Failure;
-use quadfrog_console::put_line;
 
 /// The control period.
 pub const PERIOD: Duration = Duration::from_millis(1);

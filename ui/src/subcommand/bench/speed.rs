@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use crate::put_line;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
-use quadfrog_console::put_line;
 
 use super::machine;
 use crate::subcommand::failure::Failure;

@@ -5,12 +5,12 @@ mod schema;
 
 use std::path::{Path, PathBuf};
 
+use crate::{output, put_line};
 use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::{Config, reference, write_new_files};
 use quadfrog::trial::{Backend, Task};
-use quadfrog_console::{output, put_line};
 use toml::{Table, Value};
 
 use super::arguments::{load_config_for, load_model, user_folder};

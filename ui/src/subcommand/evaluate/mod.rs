@@ -7,6 +7,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::output;
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,7 +20,6 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
 use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
-use quadfrog_console::output;
 use serde_json::json;
 
 use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds};

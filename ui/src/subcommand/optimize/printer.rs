@@ -12,8 +12,8 @@ use quadfrog::session::experiment::Experiment;
 use quadfrog::trial::{MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
+use crate::output;
 use crate::subcommand::selection::SelectedStudy;
-use quadfrog_console::output;
 
 pub struct Printer {
     json: bool,

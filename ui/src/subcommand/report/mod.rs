@@ -6,11 +6,11 @@ mod write;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
+use crate::{notice, output};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::report::study::TrialChoice;
 use quadfrog::report::{html, study_page, svg, text};
-use quadfrog_console::{notice, output};
 
 use super::arguments::VERSION;
 use super::completion;

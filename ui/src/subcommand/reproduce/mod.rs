@@ -12,11 +12,11 @@ mod work;
 
 use std::path::{Path, PathBuf};
 
+use crate::{notice, output};
 use clap::Args;
 use quadfrog::report::page::Page;
 use quadfrog::report::{html, svg, text};
 use quadfrog::session::parallel::cores;
-use quadfrog_console::{notice, output};
 
 use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;

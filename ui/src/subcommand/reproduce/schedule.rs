@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use crate::notice;
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::in_parallel;
-use quadfrog_console::notice;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
