@@ -44,6 +44,15 @@ impl SignalTopic {
             SignalTopic::JointCommand => "/robot/joint_cmd",
         }
     }
+
+    /// Returns a few words about its signals.
+    pub fn about(self) -> &'static str {
+        match self {
+            SignalTopic::Tick => "State of the trunk, feet, estimate and phase of every tick",
+            SignalTopic::JointStates => "Measured angle, speed and torque of each joint",
+            SignalTopic::JointCommand => "Commanded angle, speed, torque and gains of each joint",
+        }
+    }
 }
 
 /// Ticks of a recording.

@@ -74,9 +74,9 @@ impl ReportedStudy {
         self.recordings.trials.get(&trial)
     }
 
-    /// Trials of a verdict.
+    /// Trials that ran and have that verdict.
     pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &TrialRecord> {
-        self.rows.iter().filter(move |row| row.verdict == Some(verdict))
+        self.rows.iter().filter(move |row| row.verdict == Some(verdict) && !row.was_not_run())
     }
 
     /// Trials that count.

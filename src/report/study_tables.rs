@@ -35,7 +35,7 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
         table.rows.push(vec![
             Cell::text(title(study)),
             Cell::text(study.robot.clone()),
-            Cell::count(study.rows.len()),
+            Cell::count(study.rows.iter().filter(|row| !row.was_not_run()).count()),
             count(Verdict::Accept),
             count(Verdict::Fall),
             count(Verdict::Void),
@@ -241,7 +241,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
         let expected = expected.into_iter().zip([3, 2]).filter(|_| expects);
         let cells = cells.chain(expected.map(|(value, digits)| Cell::optional(value, digits)));
         let cells = cells.chain([Cell::optional(row.value, 3)]).chain(measured(row));
-        let texts = [Cell::text(verdict), Cell::text(row.source.name())];
+        let texts = [Cell::text(verdict), Cell::text(row.origin())];
         table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(ticks))).collect());
     }
     table

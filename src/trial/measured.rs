@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use super::{Task, TrialRecord, Verdict};
+use super::{Task, Verdict};
 
 /// Beginning of the cause of a verdict that was changed after it had become final.
 pub const CHANGED: &str = "changed by the operator";
@@ -137,24 +137,5 @@ mod seed_as_text {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
         String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
-    }
-}
-
-impl TrialRecord {
-    /// Returns whether it counts with a value measured by hand.
-    pub fn counts_by_hand(&self) -> bool {
-        self.verdict == Some(Verdict::Accept) && self.hand_value.is_some()
-    }
-
-    /// Returns whether the operator has judged it otherwise than suggested, or has changed its verdict later.
-    pub fn is_overruled(&self) -> bool {
-        let otherwise =
-            self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
-        otherwise || self.cause.starts_with(CHANGED)
-    }
-
-    /// Returns the number of repeats that count.
-    pub fn counted_repeats(&self) -> u32 {
-        self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
     }
 }

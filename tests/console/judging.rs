@@ -41,7 +41,7 @@ fn landed(after_ms: u64) -> Console {
 fn impulse_and_flight(screen: &str) -> Option<(usize, usize)> {
     let line = screen.lines().find(|line| line.contains("flight"))?;
     let column = |name: &str| line.find(name).map(|at| line[..at].chars().count());
-    let (impulse, flight, landing) = (column("i")?, column("flight")?, column("landing")?);
+    let (impulse, flight, landing) = (column("impu")?, column("flight")?, column("landing")?);
     Some((flight - impulse, landing - flight))
 }
 
@@ -255,7 +255,7 @@ fn the_flight_on_the_charts_is_that_of_the_feet() {
     let screen = console.screen(80, 24);
     let line = screen.lines().find(|line| line.contains("flight")).unwrap_or_else(|| panic!("no flight:\n{screen}"));
     let (flight, landing) = (line.find("flight"), line.find("landing"));
-    assert!(flight < landing && line.find('i') < flight, "impulse, flight, landing: {line}");
+    assert!(flight < landing && line.find('│') < flight, "impulse, flight, landing: {line}");
 }
 
 #[test]
@@ -416,6 +416,9 @@ fn a_verdict_key_that_is_pressed_twice_judges_once_and_keeps_the_first_answer() 
         // Before the answer of the session and after it.
         for answered in [false, true] {
             let mut console = landed(0);
+            // A fall that was not suggested is asked about.
+            let suggested = if verdict == Verdict::Fall { verdict } else { Verdict::Accept };
+            console.record(Record::Trial(trial(1, None, Some(suggested))));
             assert_eq!(console.requests(&[key]), [OperatorRequest::Judge(verdict)]);
             if answered {
                 console.answer(verdict.name(), true, "trial 1; u takes it back");

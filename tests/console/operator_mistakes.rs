@@ -121,10 +121,17 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     // The first override; a point that is queued twice is said to be, and one of both is removed again.
     override_by(&mut session, ["1,3", "80", "250"]);
     session.wait_for(&["80"]);
-    session.send("QQ");
+    session.send("Q");
+    session.wait_for(&["from the queue"]);
+    session.send("Q");
+    session.wait_for(&["Queue it once more?"]);
+    session.send("y");
+    session.wait_for(&["queued once more"]);
     session.send("N");
     session.wait_for(&["Queue", "#2    queued", "#3    queued"]);
     session.send(&format!("{DOWN}x"));
+    session.wait_for(&["Remove it from the queue?"]);
+    session.send("y");
     session.wait_for(&["trial 3 is removed from the queue"]);
     session.send(ESCAPE);
     let trial = jump(&mut session);

@@ -51,11 +51,13 @@ fn queued_points_are_seen_moved_and_removed() {
     session.send("N");
     session.wait_for(&["#1    queued          f0 1.1"]);
     session.send("\x1b[Bx");
+    session.wait_for(&["Remove it from the queue?", "Trial #1 leaves the queue"]);
+    session.send("y");
     session.wait_for(&["trial 1 is removed from the queue", "#2    queued          f0 1.2"]);
     assert!(!session.screen().contains("#1    queued"), "{}", session.screen());
     session.send("\r");
     session.send("2");
-    session.wait_for(&["v void", "queued", "removed from the queue"]);
+    session.wait_for(&["v not run", "queued", "removed from the queue", "1 not run"]);
     session.send("1");
     assert!(session.quit().success());
 
@@ -96,6 +98,12 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut session, _) = session_with_queue(folder.path());
     session.send("x");
+    session.wait_for(&["Trial #0, the present proposal, leaves the queue"]);
+    session.send("n");
+    session.wait_for(&["cancelled: not removed", "#0    queued          f0 1.1"]);
+    session.send("x");
+    session.wait_for(&["Remove it from the queue?"]);
+    session.send("y");
     session.wait_for(&["trial 0 is removed from the queue", "#1    queued          f0 1.2"]);
     session.send("\r");
     session.wait_for(&["Trial #1", "1.200"]);
@@ -114,14 +122,14 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     session.wait_for(&["judge it"]);
     session.send("N");
     session.wait_for(&["#2    queued          f0 1.3"]);
-    session.send("x");
+    session.send("xy");
     session.wait_for(&["finish the present trial first"]);
     session.send("\r");
     session.send("a");
     session.wait_for(&["Trial #2"]);
     session.send("N");
     session.wait_for(&["#2    queued          f0 1.3"]);
-    session.send("x");
+    session.send("xy");
     session.wait_for(&["Nothing is queued: the sampler proposes."]);
     session.send("\r");
     session.wait_for(&["Trial #3"]);
@@ -131,9 +139,15 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
 fn a_point_that_is_queued_twice_is_said_to_be() {
     let (_folder, mut session) = Session::opened((80, 24), &["--seed", "3", "--sampler", "random"]);
     session.send("Q");
-    session.wait_for(&["queued"]);
+    session.wait_for(&["Trial #0, from the queue"]);
     session.send("Q");
-    session.wait_for(&["queued once more"]);
+    session.wait_for(&["Queue it once more?", "remains the proposal"]);
+    session.send("n");
+    session.wait_for(&["cancelled: not queued"]);
+    session.send("Q");
+    session.wait_for(&["Queue it once more?"]);
+    session.send("y");
+    session.wait_for(&["queued once more", "1 more queued (N)"]);
     session.send("N");
     session.wait_for(&["#0    queued", "#1    queued"]);
 }

@@ -15,7 +15,7 @@ fn follow(folder: &Path, file: &str) -> Session {
     let mut session = Session::run(folder, (120, 40), command);
     session.wait_for(&["FOLLOWING"]);
     session.send("2");
-    session.wait_for(&["cause, note"]);
+    session.wait_for(&["note | cause"]);
     session
 }
 

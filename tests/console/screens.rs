@@ -184,7 +184,7 @@ fn the_phases_of_a_jump_are_named_under_the_charts() {
         console.tick(tick(time_ms, 0.0, trial));
     }
     let screen = console.screen(120, 40);
-    assert!(screen.lines().any(|line| line.contains("i─f─l")), "{screen}");
+    assert!(screen.lines().any(|line| line.contains("│─│─│")), "{screen}");
 }
 
 #[test]

@@ -80,8 +80,10 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     session.wait_for(&["Fx    120.0 N"]);
     session.approve();
     session.wait_for(&["Trial #0: judge it"]);
-    // The suggested verdict may be accept; the operator decides.
+    // The suggested verdict is accept; the operator decides.
     session.send("f");
+    session.wait_for(&["Did the robot fall?"]);
+    session.send("y");
     session.wait_for(&["Trial #1, by the sampler"]);
     if session.screen().contains("DISARMED") {
         session.send("A");

@@ -68,7 +68,7 @@ fn a_fault_and_a_stop_come_before_a_pending_verdict() {
     for (columns, rows) in [(80, 24), (120, 40)] {
         let screen = console.screen(columns, rows);
         let last = screen.lines().last().unwrap();
-        assert_shows(last, &["STOPPED; check the robot, then k acknowledges", "f fall (suggested)"]);
+        assert_shows(last, &["FELL; check the robot, then k acknowledges", "f fall (suggested)"]);
     }
     assert_eq!(console.requests(&["f"]), [OperatorRequest::Judge(Verdict::Fall)], "it is offered and it acts");
     // STOP after the landing has a cause of its own.

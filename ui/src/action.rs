@@ -165,7 +165,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
         row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point ahead of the sampler's"),
         row(A::Queue, "queue", &["N"], G::Proposal, "the queue: see, move and remove the points that run next"),
-        row(A::Skip, "skip", &["n"], G::Proposal, "refuse the proposal, after a question; another follows"),
+        row(A::Skip, "skip", &["n"], G::Proposal, "skip the proposal, after a question; another follows"),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
         row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),
         row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study"),
@@ -174,7 +174,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0 (Trials: as accept)"),
         row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler (Trials: as accept)"),
         row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
-        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial is approved or refused"),
+        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial is approved or skipped"),
         row(A::HandValue, "hand-value", &["="], G::Verdict, "use a value measured by hand"),
         row(A::Note, "note", &["m"], G::Verdict, "write a note on a trial"),
 

@@ -12,12 +12,12 @@ use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::model::trials::measured;
 
-/// Cause and note on one line.
+/// Note and cause on one line; the operator's own words come first, because a long line is cut.
 pub fn remark(trial: &TrialRecord) -> String {
-    match (trial.cause.as_str(), trial.note.as_str()) {
-        (cause, "") => cause.to_owned(),
-        ("", note) => format!("| {note}"),
-        (cause, note) => format!("{cause} | {note}"),
+    match (trial.note.as_str(), trial.cause.as_str()) {
+        ("", cause) => cause.to_owned(),
+        (note, "") => format!("{note} |"),
+        (note, cause) => format!("{note} | {cause}"),
     }
 }
 
@@ -58,7 +58,7 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
     }
     let value = trial.value.map_or("-".to_owned(), |value| value.to_string());
     let verdict = trial.verdict_name().unwrap_or("-");
-    let (unit, source, remark) = (&model.session.info.unit, trial.source.name(), remark(trial));
+    let (unit, source, remark) = (&model.session.info.unit, trial.origin(), remark(trial));
     text + &format!("\tJ={value} {unit}\t{verdict}\t{source}\t{remark}")
 }
 

@@ -13,7 +13,7 @@ use crate::optimize::ask::SamplerConfig;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
-    Backend, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterInfo, ParameterValues, Proposal,
+    Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, MeasuredJump, ParameterInfo, ParameterValues, Proposal,
     ProposalSource, RepeatRecord, Task, TrialRecord, Verdict,
 };
 
@@ -359,6 +359,8 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     let origin = Origin::of_trial(trial);
     let seed = origin.seed();
     let Origin { source, parent, gains, repeats, .. } = origin;
+    // In table order: the journal has them by name.
+    let gains = GAIN_UNITS.iter().filter_map(|(name, _)| Some(((*name).to_owned(), gains.get(name)?))).collect();
     let kept = TrialAttributes::of(trial);
     let fits = |verdict: &Verdict| match trial.state {
         TrialState::Complete => *verdict != Verdict::Void,

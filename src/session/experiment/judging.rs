@@ -128,7 +128,7 @@ impl Experiment {
         }
         let Some(pending) = self.pending_verdict.as_ref().filter(|_| self.is_idle()) else {
             return not_now(
-                "there is no verdict to undo; the last one became final when the next trial was approved or refused",
+                "there is no verdict to undo; the last one became final when the next trial was approved or skipped",
             );
         };
         let mut row = pending.suggestion.clone();

@@ -44,7 +44,9 @@ use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
 use crate::telemetry::TrialSpec;
-use crate::trial::{Backend, ExperimentStage, ParameterInfo, Proposal, SearchStatus, TrialRecord, Verdict};
+use crate::trial::{
+    Backend, ExperimentStage, NOT_RUN, ParameterInfo, Proposal, SKIPPED, SearchStatus, TrialRecord, Verdict,
+};
 
 /// A verdict that can still be undone.
 #[derive(Debug, Clone, PartialEq)]
@@ -237,7 +239,7 @@ impl Experiment {
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to approve") };
         open.must_be(trial, revision)?;
         if let Some(refusal) = self.refusal() {
-            return not_now(format!("{refusal}; change it, or refuse the proposal"));
+            return not_now(format!("{refusal}; change it, or skip the proposal"));
         }
         let approved = open.approved();
         let number = self.begin(approved, None)?;
@@ -255,8 +257,8 @@ impl Experiment {
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to skip") };
         open.must_be(trial, revision)?;
         let cause = match self.refusal() {
-            Some(refusal) => format!("not run: {refusal}"),
-            None => "skipped before the jump".to_owned(),
+            Some(refusal) => format!("{NOT_RUN}{refusal}"),
+            None => SKIPPED.to_owned(),
         };
         let approved = open.approved();
         self.begin(approved, Some(cause))?;
@@ -321,6 +323,11 @@ impl Experiment {
     /// Reports the pending verdict: the session ends.
     pub fn close(&mut self) -> Result<(), StudyError> {
         self.report_verdict().map(drop)
+    }
+
+    /// Returns the trial whose verdict can be taken back.
+    pub fn undoable(&self) -> Option<u32> {
+        self.pending_verdict.as_ref().map(|pending| pending.suggestion.trial)
     }
 
     fn is_idle(&self) -> bool {

@@ -5,7 +5,7 @@ use super::attributes::{self, Origin, RemovedAttributes};
 use super::plan::{RequestRefusal, not_now};
 use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::{ParameterValues, QueuedPoint, Verdict};
+use crate::trial::{ParameterValues, QueuedPoint, REMOVED, Verdict};
 
 impl Experiment {
     /// Removes a queued point: its trial becomes void, which the sampler does not see, and it never runs.
@@ -13,10 +13,9 @@ impl Experiment {
     pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         self.must_be_queued(trial)?;
         let proposed = self.is_next(trial);
-        let cause = "removed from the queue by the operator";
         // Another program may have queued it, without an origin.
         let mut removed = Origin::of_trial(self.study.trial(trial)?).attributes();
-        removed.extend(attributes::write(&RemovedAttributes { verdict: Verdict::Void, cause }));
+        removed.extend(attributes::write(&RemovedAttributes { verdict: Verdict::Void, cause: REMOVED }));
         let waits = |trial: &Trial| trial.state == TrialState::Waiting;
         if self.study.tell_if(trial, Outcome::Fail, &removed, waits)? != TellOutcome::Recorded {
             return not_now(format!("trial {trial} has just begun elsewhere"));

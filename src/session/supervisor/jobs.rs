@@ -11,7 +11,7 @@ use crate::session::operator_request::StampedRequest;
 use crate::session::prior::PriorWork;
 use crate::session::storage::{FinishedJob, JobOutput, StorageWatch};
 use crate::telemetry::{Command, CommandRefusal, Mode, TrialSpec};
-use crate::trial::ExperimentStage;
+use crate::trial::{ExperimentStage, NOT_RUN};
 
 /// A longer wait for the storage of the study is logged, ns.
 const LOGGED_WAIT_NS: u64 = 1_000_000_000;
@@ -157,7 +157,7 @@ impl Supervisor {
         match holds.and_then(|()| self.command(Command::RunTrial(*spec, state.permit))) {
             Ok(()) => Ok("the countdown begins".to_owned()),
             Err(reason) => {
-                let cause = format!("not run: {reason}");
+                let cause = format!("{NOT_RUN}{reason}");
                 self.give(JobPurpose::Withdraw, time_ns, move |experiment| {
                     JobOutput::Done(experiment.withdraw(trial, &cause))
                 });

@@ -19,7 +19,16 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
             judged(experiment.void_because(reason, false), format!("{trial} is void"))
         }
         OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
-        _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
+        OperatorRequest::Undo => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
+        _ => {
+            let undoable = experiment.undoable();
+            let mut answer = change(experiment, request).map_err(|refusal| refusal.to_string());
+            let final_now = undoable.filter(|_| experiment.undoable().is_none());
+            if let (Ok(answer), Some(trial)) = (&mut answer, final_now) {
+                *answer += &format!("; the verdict of trial {trial} is final now");
+            }
+            JobOutput::Answer(answer)
+        }
     }
 }
 

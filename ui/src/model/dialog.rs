@@ -99,10 +99,16 @@ pub enum Dialog {
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "the names say the rest")]
 pub enum Question {
-    /// Refuse this proposal.
+    /// Skip this proposal.
     Skip { trial: u32, revision: u32 },
-    /// Accept a trial whose suggested verdict is another, or judge one a fall whose suggested verdict is void.
+    /// Accept a trial, or judge it a fall, whose suggested verdict is another.
     JudgeAnyway { trial: u32, verdict: Verdict },
+    /// Queue the values of the open proposal once more: it is from the queue itself.
+    QueueProposed { trial: u32 },
+    /// Remove a point from the queue.
+    RemoveQueued { trial: u32 },
+    /// Take a verdict back while another row is selected.
+    Undo { trial: u32 },
     /// Queue the parameters of a judged trial again.
     Rerun { trial: u32 },
     /// Use a value measured by hand that lies far from the robot's own measurement.

@@ -60,9 +60,9 @@ impl SessionModel {
         self.under_review().filter(|trial| trial.suggested.is_some_and(|verdict| verdict != Verdict::Accept))
     }
 
-    /// The trial that waits for its verdict, if this one is suggested.
-    pub fn suggested(&self, verdict: Verdict) -> Option<&TrialRecord> {
-        self.under_review().filter(|trial| trial.suggested == Some(verdict))
+    /// The trial that waits for its verdict, if another one than fall is suggested.
+    pub fn not_to_fall(&self) -> Option<&TrialRecord> {
+        self.under_review().filter(|trial| trial.suggested.is_some_and(|verdict| verdict != Verdict::Fall))
     }
 
     /// The trial whose verdict can be taken back.
@@ -123,7 +123,14 @@ impl SessionModel {
             }),
         };
         let model_best = u16::from(self.stage_is(ExperimentStage::Finished) && self.trials.model_best.is_some());
-        parameters + 4 + gains + repeats + expected + model_best
+        let queued = u16::from(self.queued_beside() > 0);
+        parameters + 4 + gains + repeats + expected + queued + model_best
+    }
+
+    /// The number of queued points without the proposal.
+    pub fn queued_beside(&self) -> usize {
+        let proposed = self.proposal.as_ref().map(|proposal| proposal.trial);
+        self.queue().iter().filter(|point| Some(point.trial) != proposed).count()
     }
 
     /// Returns the queued points, the next one first.

@@ -36,9 +36,9 @@ impl Trials {
         self.records.values().next_back()
     }
 
-    /// The number of trials with that verdict.
+    /// The number of trials that ran and have that verdict.
     pub fn count(&self, verdict: Verdict) -> usize {
-        self.records.values().filter(|trial| trial.verdict == Some(verdict)).count()
+        self.records.values().filter(|trial| has_verdict(trial, verdict)).count()
     }
 
     /// The best trial by the sampler's model; without one the accepted trial of the highest mean over the repeats of its point,
@@ -74,6 +74,11 @@ impl Trials {
             |t: &&TrialRecord| t.parent.filter(|parent| *parent < t.trial).and_then(|parent| self.records.get(&parent));
         std::iter::successors(Some(trial), parent).count()
     }
+}
+
+/// Whether a trial ran and has that verdict.
+fn has_verdict(trial: &TrialRecord, verdict: Verdict) -> bool {
+    trial.verdict == Some(verdict) && !trial.was_not_run()
 }
 
 pub fn accepted_value(trial: &TrialRecord) -> Option<f64> {
@@ -139,7 +144,7 @@ impl TrialTable {
             trials.best_so_far().collect()
         } else {
             let all = trials.records.values().chain(later);
-            all.filter(|trial| self.filter.is_none() || trial.verdict == self.filter).collect()
+            all.filter(|trial| self.filter.is_none_or(|verdict| has_verdict(trial, verdict))).collect()
         };
         // A filter never hides the trial that waits for its verdict.
         let waits =

@@ -139,7 +139,9 @@ fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
     model.live.ghost = trial.filter(|trial| model.history.trace(*trial).is_some());
     match (model.live.ghost, trial) {
         (Some(a), _) => {
-            format!("trial {a} is laid under the charts of a jump; a second one in Trials compares the two")
+            let comparable = model.history.traces().any(|trial| trial != a);
+            let second = if comparable { "; a second one in Trials compares the two" } else { "" };
+            format!("trial {a} is laid under the charts of a jump{second}")
         }
         (None, Some(trial)) => no_signals(model, trial),
         (None, None) => "no trial was accepted yet".to_owned(),

@@ -69,7 +69,15 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::ClearOverrides => return request(model, OperatorRequest::ClearOverrides),
         Action::Fix => return fix(model),
         Action::Bounds => bounds(model),
-        Action::QueuePoint => return queue_point(model),
+        Action::QueuePoint => {
+            let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
+            let (trial, point) = (proposal.trial, queued_values(proposal));
+            // The sampler's proposal stays and is from the queue then; a point of the queue would run twice.
+            match model.session.queue().iter().any(|queued| queued.trial == trial) {
+                true => open(model, Dialog::Confirm(Question::QueueProposed { trial })),
+                false => return request(model, OperatorRequest::Enqueue(point)),
+            }
+        }
         Action::Queue => open(model, Dialog::Queue { selected: 0 }),
         Action::Skip => {
             if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
@@ -87,9 +95,9 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
                 open(model, Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Accept }));
             }
         }
-        // Nothing was measured, or the operator has stopped it: the sampler would avoid its parameters.
-        Action::Fall if model.session.suggested(Verdict::Void).is_some() => {
-            if let Some(trial) = model.session.suggested(Verdict::Void).map(|row| row.trial) {
+        // The sampler would avoid its parameters.
+        Action::Fall if model.session.not_to_fall().is_some() => {
+            if let Some(trial) = model.session.not_to_fall().map(|row| row.trial) {
                 open(model, Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Fall }));
             }
         }
@@ -97,7 +105,15 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Fall => return judge(model, Verdict::Fall),
         Action::Void => return judge(model, Verdict::Void),
         Action::Rerun => return rerun(model),
-        Action::Undo => return request(model, OperatorRequest::Undo),
+        Action::Undo => {
+            let selected = model.selected_trial().map(|row| row.trial).filter(|_| model.view == View::Trials);
+            match model.session.undoable() {
+                Some(trial) if selected.is_some_and(|selected| selected != trial) => {
+                    open(model, Dialog::Confirm(Question::Undo { trial }));
+                }
+                _ => return request(model, OperatorRequest::Undo),
+            }
+        }
         Action::HandValue => {
             if let Some(trial) = model.session.under_review() {
                 let text = trial.hand_value.map(six_digits).unwrap_or_default();
@@ -148,7 +164,11 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Search => open(model, Dialog::field(Purpose::TrialNumber, "")),
         Action::Copy => {
             if let Some(trial) = model.selected_trial().map(|trial| trial.trial) {
-                say(model, LogLevel::Info, "the row is on your terminal's clipboard (OSC 52)");
+                say(
+                    model,
+                    LogLevel::Info,
+                    "the row was sent to the clipboard of your terminal (OSC 52), if it has one",
+                );
                 return vec![Effect::CopyTrial(trial)];
             }
         }
@@ -255,11 +275,10 @@ fn bounds(model: &mut Model) {
     }
 }
 
-fn queue_point(model: &mut Model) -> Vec<Effect> {
-    let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
+/// The values of a proposal as a point for the queue: its parameters, and the gains that were changed.
+pub(super) fn queued_values(proposal: &Proposal) -> Vec<(String, f64)> {
     let gains = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
-    let point = proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect();
-    request(model, OperatorRequest::Enqueue(point))
+    proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect()
 }
 
 /// Enter: overrides, goes to the trial of a replay or opens the details. It never starts motion and acknowledges no stop: it may

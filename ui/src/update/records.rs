@@ -31,13 +31,17 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
             let shown = model.session.open_proposal().map(|p| (p.trial, p.revision));
             shown != Some((*trial, *revision)) || legal(Action::Skip, model).is_err()
         }
-        Some(Dialog::Confirm(Question::JudgeAnyway { trial, .. })) => {
-            model.session.not_to_accept().is_none_or(|row| row.trial != *trial)
-        }
-        Some(Dialog::Confirm(Question::Rerun { .. })) => legal(Action::Rerun, model).is_err(),
-        Some(Dialog::Confirm(Question::HandValue { trial, .. })) => {
+        Some(Dialog::Confirm(Question::JudgeAnyway { trial, .. } | Question::HandValue { trial, .. })) => {
             model.session.under_review().is_none_or(|row| row.trial != *trial)
         }
+        Some(Dialog::Confirm(Question::QueueProposed { trial })) => {
+            model.session.open_proposal().is_none_or(|proposal| proposal.trial != *trial)
+        }
+        Some(Dialog::Confirm(Question::RemoveQueued { trial })) => {
+            model.session.queue().iter().all(|point| point.trial != *trial)
+        }
+        Some(Dialog::Confirm(Question::Undo { trial })) => model.session.undoable() != Some(*trial),
+        Some(Dialog::Confirm(Question::Rerun { .. })) => legal(Action::Rerun, model).is_err(),
         Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),
         Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
         Some(Dialog::Override(form)) => {

@@ -54,8 +54,9 @@ pub(super) fn refused(model: &mut Model, subject: &str, reason: &str) -> Vec<Eff
 /// Sends a request to the session, except in a replay or from an observer.
 pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect> {
     if matches!(request, OperatorRequest::Arm | OperatorRequest::Approve { .. }) {
-        // Charts of the past beside a robot that moves would be taken for the present.
+        // Charts of the past beside a robot that moves would be taken for the present, and an earlier row for the trial.
         model.live.frozen = None;
+        model.trial_table.selected = None;
     }
     let allowed = if request == OperatorRequest::Acknowledge { may_acknowledge(model) } else { may_request(model) };
     match allowed {

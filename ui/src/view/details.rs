@@ -42,6 +42,8 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
             format!("took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9)
         });
         row("ran", format!("at {} of the session, {took}", clock(ran.begun_ns)));
+    } else if trial.verdict.is_some() {
+        row("ran", if trial.was_not_run() { "not at all" } else { "not in this session" }.to_owned());
     }
     for (name, value) in &trial.parameters {
         let index = session.info.parameters.iter().position(|info| info.name == *name);

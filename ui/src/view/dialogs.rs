@@ -35,7 +35,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     match dialog {
         Dialog::Approve { trial, pressed_at, area_clear, .. } => {
             let waited = model.clock.saturating_sub(*pressed_at) >= APPROVAL_PAUSE;
-            popup(frame, area, model, "Jump?", 60, questions::approve(model, *trial, waited, *area_clear));
+            popup(frame, area, model, "Jump?", 72, questions::approve(model, *trial, waited, *area_clear));
         }
         Dialog::TakeControl => popup(frame, area, model, "Take control?", 66, questions::take_control(model)),
         Dialog::Arm { typed, .. } => popup(frame, area, model, "Arm?", 60, questions::arm(model, *typed)),

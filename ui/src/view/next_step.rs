@@ -84,18 +84,28 @@ fn live(model: &Model) -> NextStep {
         // What a stopped robot needs comes before the verdict.
         mode if stage == Some(ExperimentStage::Review) && !matches!(mode, Mode::Damped | Mode::Fault) => review(model),
         mode @ (Mode::Damped | Mode::Fault) => {
-            let stopped = if mode == Mode::Fault { "FAULT" } else { "STOPPED" };
             let cause = &session.stopped_because;
-            let review = session.stage_is(ExperimentStage::Review);
+            // A verdict is possible unless another row of Trials is selected.
+            let waiting = session.under_review().map(|trial| trial.trial);
+            let review = waiting.is_some() && waiting_trial_is_meant(model).is_ok();
             let fell = session.under_review().is_some_and(|trial| trial.suggested == Some(Verdict::Fall));
             // The cause of a fall stands beside its suggested verdict; STOP says itself why.
             let is_stop = *cause == TransitionCause::Stop.to_string();
+            let stopped = match mode {
+                Mode::Fault => "FAULT",
+                _ if fell && !is_stop => "FELL",
+                _ => "STOPPED",
+            };
             let because = match cause.is_empty() || is_stop || mode == Mode::Damped && fell {
                 true => String::new(),
                 false => format!(": {cause}"),
             };
             // The key first: a long reason may be cut.
-            let lead = format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
+            let mut lead =
+                format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
+            if let Some(trial) = waiting.filter(|_| !review) {
+                lead += &format!(". Trial {trial} waits for its verdict");
+            }
             // A verdict can be given before the acknowledgement; the suggested one comes first.
             let suggested = session.under_review().and_then(|trial| trial.suggested);
             let mut verdicts = [
@@ -288,6 +298,15 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Confirm(Question::Rerun { trial }) => {
             format!("Press y to queue trial #{trial} again. Any other key cancels.")
+        }
+        Dialog::Confirm(Question::QueueProposed { .. }) => {
+            "Press y to queue the values. Any other key cancels.".to_owned()
+        }
+        Dialog::Confirm(Question::RemoveQueued { trial }) => {
+            format!("Press y to remove trial #{trial} from the queue. Any other key cancels.")
+        }
+        Dialog::Confirm(Question::Undo { trial }) => {
+            format!("Press y to take the verdict of trial #{trial} back. Any other key cancels.")
         }
         Dialog::Confirm(Question::HandValue { .. }) => "Press y to use the value. Any other key cancels.".to_owned(),
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),

@@ -82,7 +82,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
             buffer.set_string(column(*trial), y, theme.bar(), theme.style(Role::Quiet));
         }
     }
-    for trial in session.trials.records.values() {
+    for trial in session.trials.records.values().filter(|trial| !trial.was_not_run()) {
         let (symbol, role) = sign(trial.verdict);
         let y = match trial.verdict {
             Some(Verdict::Void) => bottom,

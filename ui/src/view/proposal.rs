@@ -73,6 +73,13 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 let text = format!(" hop envelope: {:.0} % of force", 100.0 * share);
                 lines.push(Line::from(span(theme, Role::Warning, text)));
             }
+            match session.queued_beside() {
+                0 => {}
+                count => {
+                    let text = format!(" {count} more queued ({})", model.keymap.key(Action::Queue));
+                    lines.push(Line::from(span(theme, Role::Quiet, text)));
+                }
+            }
             if let Some(left) = session.confirming() {
                 lines.push(Line::from(span(theme, Role::Warning, format!(" confirming the best: {left} left"))));
                 lines.extend(points::lines(session, theme, width));

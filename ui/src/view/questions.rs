@@ -2,7 +2,7 @@
 
 use quadfrog::session::objective;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, ProposedParameter, Verdict, six_digits};
+use quadfrog::trial::{ExperimentStage, ProposedParameter, TrialRecord, Verdict, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{number, span};
@@ -65,15 +65,18 @@ pub fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec
     let mut lines = Vec::new();
     if let Some(proposal) = &model.session.proposal {
         let value = |p: &ProposedParameter| {
-            let unit = model.session.parameter(&p.name).map_or(String::new(), |info| info.unit);
-            format!("{} {} {unit}", p.name, number(p.value))
+            let info = model.session.parameter(&p.name).or_else(|| model.session.gain(&p.name).cloned());
+            let unit = info.map_or(String::new(), |info| info.unit);
+            let before = if p.value == p.proposed { String::new() } else { format!(" (was {})", number(p.proposed)) };
+            format!("{} {} {unit}{before}", p.name, number(p.value))
         };
-        let values: Vec<String> = proposal.parameters.iter().map(value).collect();
+        let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
+        let values: Vec<String> = proposal.parameters.iter().chain(changed).map(value).collect();
         lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
     lines.push(Line::from(match area_clear {
-        true => "The area is clear, confirmed for this jump.",
-        false => "Is the area clear of people and objects?",
+        true => "The area is clear, confirmed for this jump. A countdown follows.",
+        false => "Is the area clear of people and objects? A countdown follows.",
     }));
     lines.push(Line::default());
     let area_asked = model.session.info.is_hardware() && !area_clear;
@@ -82,7 +85,7 @@ pub fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec
         false => answers(&model.theme, &key, "jump"),
     };
     if !area_asked && !waited {
-        answer.push_span(span(theme, Role::Quiet, " (after 0.8 s)"));
+        answer.push_span(span(theme, Role::Quiet, ", 0.8 s after the first press"));
     }
     lines.push(answer);
     lines
@@ -137,21 +140,48 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             ("Queue it again?", vec![Line::from(text), Line::default(), answer])
         }
         Question::JudgeAnyway { trial, verdict: Verdict::Fall } => {
-            let cause = model.session.not_to_accept().map_or("", |row| row.cause.as_str());
+            let Some(row) = model.session.not_to_fall() else { return ("Judge it a fall?", Vec::new()) };
+            let suggested = row.suggested.unwrap_or(Verdict::Void).name();
+            let (title, otherwise) = match row.suggested {
+                Some(Verdict::Accept) => ("Did the robot fall?", format!("Accept reports {}.", value(model, row))),
+                _ => ("Judge a void trial a fall?", "Void hides the trial from it.".to_owned()),
+            };
             let lines = vec![
-                Line::from(format!("The suggested verdict of trial #{trial} is void: {cause}.")),
+                Line::from(format!("The suggested verdict of trial #{trial} is {suggested}: {}.", row.cause)),
                 Line::from("Fall reports J = 0 to the optimizer, which then avoids these parameters."),
-                Line::from("Void hides the trial from it."),
+                Line::from(otherwise),
                 Line::default(),
                 answers(&model.theme, "y", "fall"),
             ];
-            ("Judge a void trial a fall?", lines)
+            (title, lines)
+        }
+        Question::QueueProposed { trial } => {
+            let lines = vec![
+                Line::from(format!(
+                    "Trial #{trial} is from the queue itself and remains the proposal: its values run once more after it."
+                )),
+                Line::default(),
+                answers(&model.theme, "y", "queue"),
+            ];
+            ("Queue it once more?", lines)
+        }
+        Question::RemoveQueued { trial } => {
+            let proposed = model.session.open_proposal().is_some_and(|proposal| proposal.trial == *trial);
+            let which = if proposed { ", the present proposal," } else { "" };
+            let text =
+                format!("Trial #{trial}{which} leaves the queue: it is not run, and the sampler does not see it.");
+            ("Remove it from the queue?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "remove")])
+        }
+        Question::Undo { trial } => {
+            let verdict = model.session.trials.records.get(trial).and_then(|row| row.verdict_name()).unwrap_or("-");
+            let text = format!(
+                "The verdict {verdict} of trial #{trial} is taken back: it waits for another. The selected row stays as it is."
+            );
+            ("Take the last verdict back?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "undo")])
         }
         Question::JudgeAnyway { trial, .. } => {
             let Some(row) = model.session.not_to_accept() else { return ("Accept?", Vec::new()) };
-            let value = model.session.value_if_accepted(row);
-            let unit = &model.session.info.unit;
-            let value = value.map_or("no value".to_owned(), |value| format!("J = {} {unit}", number(value)));
+            let value = value(model, row);
             let (suggested, title, otherwise) = match row.suggested {
                 Some(Verdict::Void) => ("void", "Accept a void trial?", "void hides the trial from it"),
                 _ => ("fall", "Accept a fall?", "fall reports 0"),
@@ -179,6 +209,13 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             ("Is this value right?", lines)
         }
     }
+}
+
+/// The value that the trial under review reports if it is accepted.
+fn value(model: &Model, row: &TrialRecord) -> String {
+    let unit = &model.session.info.unit;
+    let value = model.session.value_if_accepted(row);
+    value.map_or("no value".to_owned(), |value| format!("J = {} {unit}", number(value)))
 }
 
 pub fn export(model: &Model, shown: usize, all: usize) -> Vec<Line<'static>> {

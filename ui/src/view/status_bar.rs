@@ -244,11 +244,19 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
         .collect();
     frame.render_widget(Line::from(spans), area);
     let landed = model.landed().filter(|_| model.view == View::Live).map(|landed| landed.trial);
-    let aside = match (&model.live.frozen, landed) {
+    let narrow = area.width < 100;
+    let help = vec![
+        span(theme, Role::Key, model.keymap.key(Action::Help)),
+        span(theme, Role::Quiet, " help  "),
+        span(theme, Role::Key, model.keymap.key(Action::Palette)),
+        span(theme, Role::Quiet, " actions "),
+    ];
+    let mut aside = match (&model.live.frozen, landed) {
         (Some((_, at)), _) => {
             let ago_s = model.clock.saturating_sub(*at).as_secs_f64();
+            let view = if narrow { "" } else { "VIEW " };
             vec![
-                span(theme, Role::Hardware, format!(" VIEW FROZEN -{ago_s:.1} s ")),
+                span(theme, Role::Hardware, format!(" {view}FROZEN -{ago_s:.1} s ")),
                 span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
             ]
         }
@@ -257,13 +265,12 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
             span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
             span(theme, Role::Quiet, " live "),
         ],
-        (None, None) => vec![
-            span(theme, Role::Key, model.keymap.key(Action::Help)),
-            span(theme, Role::Quiet, " help  "),
-            span(theme, Role::Key, model.keymap.key(Action::Palette)),
-            span(theme, Role::Quiet, " actions "),
-        ],
+        (None, None) => Vec::new(),
     };
+    if aside.is_empty() || !narrow {
+        aside.push(Span::raw(if aside.is_empty() { "" } else { "  " }));
+        aside.extend(help);
+    }
     frame.render_widget(Line::from(aside).alignment(Alignment::Right), area);
 }
 

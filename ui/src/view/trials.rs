@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, heading, number, sign, span, truncate};
+use super::draw::{clock, heading, heading_width, number, sign, span, truncate};
 use crate::action::Action;
 use crate::column::Column;
 use crate::layout::first_row;
@@ -23,20 +23,29 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     if rows > room {
         title += &format!(" ({room} of {rows})");
     }
-    let body = heading(frame, area, &model.theme, &title, &summary(model));
+    // Where the whole summary has no room, the keys of the columns and of the order give way, then the keys of the filter.
+    let summaries = summaries(model);
+    let fits = |summary: &&String| heading_width(&title, summary) <= usize::from(area.width);
+    let summary = summaries.iter().find(fits).map_or("", String::as_str);
+    let body = heading(frame, area, &model.theme, &title, summary);
     render_table(frame, body, model, true);
 }
 
-/// The number of each verdict, and the order and filter of the table; where the trials are judged again, the result of that.
-fn summary(model: &Model) -> String {
+/// The number of each verdict, and the order and filter of the table, from the longest to the shortest; where the trials are
+/// judged again, the result of that.
+fn summaries(model: &Model) -> Vec<String> {
     if let Some(table) = &model.rejudged {
         // The end of a path names the folder.
         let skipped = table.configuration.chars().count().saturating_sub(24);
         let name: String = table.configuration.chars().skip(skipped).collect();
-        return format!("new by {name}: {}", table.summary());
+        return vec![format!("new by {name}: {}", table.summary())];
     }
     let trials = &model.session.trials;
-    let counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
+    let mut counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
+    match trials.records.values().filter(|trial| trial.was_not_run()).count() {
+        0 => {}
+        count => counts += &format!(", {count} not run"),
+    }
     let view = &model.trial_table;
     let (shown, by_filter) = match (view.best_only, view.filter) {
         (true, _) => ("best only".to_owned(), Action::BestOnly),
@@ -52,19 +61,19 @@ fn summary(model: &Model) -> String {
     };
     let turned = if view.reversed { " reversed" } else { "" };
     let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
-    format!("{counts}; by {sort}{turned} ({by}), {shown} ({only}), columns ({columns})")
+    let order = format!("by {sort}{turned} ({by}), {shown} ({only})");
+    vec![
+        format!("{counts}; {order}, columns ({columns})"),
+        format!("{counts}; {order}"),
+        format!("{counts}; {shown} ({only})"),
+        counts,
+    ]
 }
 
 /// Columns of the longest source in the table.
 fn source_width(model: &Model) -> usize {
     let rows = model.session.trials.records.values().chain(model.later_trials());
-    rows.map(|row| source(row).chars().count()).fold(9, usize::max)
-}
-
-/// The source of a trial's parameters, with the trial that it repeats.
-fn source(trial: &TrialRecord) -> String {
-    let parent = trial.parent.map_or(String::new(), |parent| format!(" {parent}"));
-    format!("{}{parent}", trial.source.name())
+    rows.map(|row| row.origin().chars().count()).fold(9, usize::max)
 }
 
 struct ShownColumn {
@@ -103,7 +112,7 @@ fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
             Column::Source => ("source".to_owned(), source_width(model)),
             Column::Risk => ("fell".to_owned(), 4),
             Column::Time => ("   ran".to_owned(), 7),
-            Column::Cause => ("cause, note".to_owned(), usize::MAX),
+            Column::Cause => ("note | cause".to_owned(), usize::MAX),
         };
         shown.push(ShownColumn { title, width, cell: CellContent::Of(*column) });
     }
@@ -256,7 +265,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             };
             (format!("{symbol} {verdict:<7}{}", if best { "*" } else { " " }), role)
         }
-        Column::Source => (source(trial), Role::Quiet),
+        Column::Source => (trial.origin(), Role::Quiet),
         Column::Risk => {
             let risk = trial.risk.filter(|risk| risk.neighbours > 0);
             (risk.map_or("-".to_owned(), |risk| format!("{}/{}", risk.falls, risk.neighbours)), Role::Quiet)

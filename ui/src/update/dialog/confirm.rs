@@ -13,6 +13,7 @@ use crate::legal::legal;
 use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Question};
+use crate::update::perform::queued_values;
 use crate::update::request::{cancelled, refused, request, say};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
@@ -104,6 +105,27 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
             request_if_legal(model, Action::Rerun, OperatorRequest::Rerun { trial: Some(*trial) }, "not queued")
         }
         Question::Rerun { .. } => cancelled(model, "not queued"),
+        Question::QueueProposed { trial } if yes => match model.session.open_proposal() {
+            Some(proposal) if proposal.trial == *trial => {
+                let point = OperatorRequest::Enqueue(queued_values(proposal));
+                request_if_legal(model, Action::QueuePoint, point, "not queued")
+            }
+            _ => refused(model, "not queued", "there is another proposal by now"),
+        },
+        Question::QueueProposed { .. } => cancelled(model, "not queued"),
+        Question::RemoveQueued { trial } => {
+            // Back to the list, which shows what the session answers.
+            let selected = model.session.queue().iter().position(|point| point.trial == *trial).unwrap_or(0);
+            model.dialog = Some(Dialog::Queue { selected });
+            match yes {
+                true => request(model, OperatorRequest::RemoveQueued { trial: *trial }),
+                false => cancelled(model, "not removed"),
+            }
+        }
+        Question::Undo { trial } if yes && model.session.undoable() == Some(*trial) => {
+            request_if_legal(model, Action::Undo, OperatorRequest::Undo, "not taken back")
+        }
+        Question::Undo { .. } => cancelled(model, "no verdict was taken back"),
         Question::HandValue { value, .. } if yes => {
             request_if_legal(model, Action::HandValue, OperatorRequest::HandValue(Some(*value)), "not used")
         }

@@ -8,13 +8,13 @@ use tui_input::Input;
 use super::text_field::edit;
 use crate::action::Action;
 use crate::keymap::Key;
-use crate::legal::palette;
+use crate::legal::{may_request, palette};
 use crate::message::Effect;
-use crate::model::dialog::{Choice, Dialog};
+use crate::model::dialog::{Choice, Dialog, Question};
 use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
-use crate::update::request::{cancelled, request};
+use crate::update::request::{cancelled, refused, request};
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -135,7 +135,12 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
             ((selected + 1).min(last), Some(OperatorRequest::MoveQueued { trial, earlier: false }))
         }
         (KeyCode::Char('x') | KeyCode::Delete, Some(trial)) => {
-            (selected, Some(OperatorRequest::RemoveQueued { trial }))
+            if let Err(reason) = may_request(model) {
+                model.dialog = Some(Dialog::Queue { selected });
+                return refused(model, "not removed", &reason);
+            }
+            model.dialog = Some(Dialog::Confirm(Question::RemoveQueued { trial }));
+            return Vec::new();
         }
         (KeyCode::Esc | KeyCode::Enter, _) => return Vec::new(),
         _ => (selected, None),

@@ -1,0 +1,98 @@
+//! The row of a trial: values, verdict, origin.
+
+use super::{
+    CHANGED, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterValues, ProposalSource, RepeatRecord, Verdict,
+};
+
+/// A row of the trial table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TrialRecord {
+    /// Number in the study.
+    pub trial: u32,
+    /// Origin of the parameters.
+    pub source: ProposalSource,
+    /// The trial whose parameters these are, for a re-run.
+    pub parent: Option<u32>,
+    /// Parameters by name, in table order.
+    pub parameters: ParameterValues,
+    /// Measured values; none while it runs, or if it was stopped before.
+    pub measured: Option<MeasuredJump>,
+    /// The objective that is reported to the sampler: the measured or the hand-measured value, 0 for a fall, none for void.
+    pub value: Option<f64>,
+    /// A value measured by hand, kept beside the measured one.
+    pub hand_value: Option<f64>,
+    /// The verdict that the rules suggest.
+    pub suggested: Option<Verdict>,
+    /// Reason of the suggestion, or of another verdict.
+    pub cause: String,
+    /// The verdict; none while it runs or waits.
+    pub verdict: Option<Verdict>,
+    /// The operator's note.
+    pub note: String,
+    /// Distance to earlier falls at its approval.
+    pub risk: Option<FallRisk>,
+    /// Expectation of the sampler's model at its approval.
+    pub expected: Option<ExpectedResult>,
+    /// The controller's gains that it ran with; empty for a trial of another program.
+    pub gains: ParameterValues,
+    /// Judged rollouts, in order, void ones included; empty for a trial that is one rollout.
+    pub repeats: Vec<RepeatRecord>,
+    /// Seed of its noise and terrain, of the first rollout if it has several; none for a trial of another program.
+    pub seed: Option<u64>,
+    /// The ranges from which its parameters were drawn; empty in older recordings.
+    pub ranges: Vec<DrawnRange>,
+}
+
+/// Cause of a point that the operator took from the queue: its trial is void and never runs.
+pub const REMOVED: &str = "removed from the queue by the operator";
+/// Cause of a proposal that the operator refused: its trial is void and never runs.
+pub const SKIPPED: &str = "skipped before the jump";
+/// Begin of the cause of a trial that the program did not let run.
+pub const NOT_RUN: &str = "not run: ";
+
+impl TrialRecord {
+    /// Returns whether it is void because it was refused before its jump.
+    pub fn was_not_run(&self) -> bool {
+        let refused = [REMOVED, SKIPPED].contains(&self.cause.as_str()) || self.cause.starts_with(NOT_RUN);
+        self.verdict == Some(Verdict::Void) && refused
+    }
+
+    /// Returns the origin of its parameters in words, with the trial that it repeats.
+    pub fn origin(&self) -> String {
+        let parent = self.parent.map_or(String::new(), |parent| format!(" {parent}"));
+        format!("{}{parent}", self.source.name())
+    }
+
+    /// Returns whether it counts for the budget: accepted or fallen. Repeats that confirm the best are beyond the budget.
+    pub fn counts(&self) -> bool {
+        matches!(self.verdict, Some(Verdict::Accept | Verdict::Fall)) && self.source != ProposalSource::Confirm
+    }
+
+    /// Returns the name of its verdict on screens and in reports; a trial that did not run has none, and one of another
+    /// program was not judged: it is complete or has failed. None while it runs or waits.
+    pub fn verdict_name(&self) -> Option<&'static str> {
+        Some(match (self.verdict?, self.source) {
+            _ if self.was_not_run() => "not run",
+            (Verdict::Accept, ProposalSource::OtherProgram) => "complete",
+            (Verdict::Void, ProposalSource::OtherProgram) => "failed",
+            (verdict, _) => verdict.name(),
+        })
+    }
+
+    /// Returns whether it counts with a value measured by hand.
+    pub fn counts_by_hand(&self) -> bool {
+        self.verdict == Some(Verdict::Accept) && self.hand_value.is_some()
+    }
+
+    /// Returns whether the operator has judged it otherwise than suggested, or has changed its verdict later.
+    pub fn is_overruled(&self) -> bool {
+        let otherwise =
+            self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
+        otherwise || self.cause.starts_with(CHANGED)
+    }
+
+    /// Returns the number of repeats that count.
+    pub fn counted_repeats(&self) -> u32 {
+        self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
+    }
+}
