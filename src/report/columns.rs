@@ -119,23 +119,30 @@ fn as_text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
+/// Destination of a table. Not a type parameter: the encoders are large, and would be compiled for each type.
+type Destination<'a> = &'a mut (dyn Write + Send);
+
 /// Writer of a table.
-pub struct TableWriter<W: Write + Send> {
-    form: Form<W>,
+pub struct TableWriter<'a> {
+    form: Form<'a>,
 }
 
-enum Form<W: Write + Send> {
-    Csv(Box<csv::Writer<W>>),
-    Json { out: W, rows: usize },
-    Parquet(Box<SerializedFileWriter<W>>),
+enum Form<'a> {
+    Csv(Box<csv::Writer<Destination<'a>>>),
+    Json { out: Destination<'a>, rows: usize },
+    Parquet(Box<SerializedFileWriter<Destination<'a>>>),
 }
 
-impl<W: Write + Send> TableWriter<W> {
+impl<'a> TableWriter<'a> {
     /// Begins a table with the names and types of these columns.
     ///
     /// # Errors
     /// When `out` cannot be written, or two columns have one name.
-    pub fn new(format: TableFormat, out: W, columns: &[TypedColumn]) -> io::Result<TableWriter<W>> {
+    pub fn new(
+        format: TableFormat,
+        out: &'a mut (dyn Write + Send),
+        columns: &[TypedColumn],
+    ) -> io::Result<TableWriter<'a>> {
         let form = match format {
             TableFormat::Csv => {
                 let mut writer = csv::Writer::from_writer(out);
@@ -184,18 +191,15 @@ impl<W: Write + Send> TableWriter<W> {
         }
     }
 
-    /// Completes the table and returns the destination.
+    /// Completes the table.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn finish(self) -> io::Result<W> {
+    pub fn finish(self) -> io::Result<()> {
         match self.form {
-            Form::Csv(writer) => writer.into_inner().map_err(csv::IntoInnerError::into_error),
-            Form::Json { mut out, rows } => {
-                out.write_all(if rows == 0 { b"[\n]\n" } else { b"\n]\n" })?;
-                Ok(out)
-            }
-            Form::Parquet(writer) => writer.into_inner().map_err(io_error),
+            Form::Csv(writer) => writer.into_inner().map(drop).map_err(csv::IntoInnerError::into_error),
+            Form::Json { out, rows } => out.write_all(if rows == 0 { b"[\n]\n" } else { b"\n]\n" }),
+            Form::Parquet(writer) => writer.into_inner().map(drop).map_err(io_error),
         }
     }
 }
@@ -230,7 +234,10 @@ fn io_error(error: ParquetError) -> io::Error {
     }
 }
 
-fn begin_parquet<W: Write + Send>(out: W, columns: &[TypedColumn]) -> Result<SerializedFileWriter<W>, ParquetError> {
+fn begin_parquet<'a>(
+    out: Destination<'a>,
+    columns: &[TypedColumn],
+) -> Result<SerializedFileWriter<Destination<'a>>, ParquetError> {
     let mut properties = WriterProperties::builder()
         .set_created_by(concat!("quadfrog ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
@@ -262,8 +269,8 @@ fn begin_parquet<W: Write + Send>(out: W, columns: &[TypedColumn]) -> Result<Ser
     SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties.build()))
 }
 
-fn write_row_group<W: Write + Send>(
-    writer: &mut SerializedFileWriter<W>,
+fn write_row_group(
+    writer: &mut SerializedFileWriter<Destination>,
     columns: &[TypedColumn],
 ) -> Result<(), ParquetError> {
     if columns.first().is_none_or(|column| column.rows() == 0) {

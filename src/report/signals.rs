@@ -120,18 +120,18 @@ impl Signals {
         signals
     }
 
-    /// Writes the rows of a recording's files, one after the other: `log_time`, ns UTC since 1970, then the signals. Returns the destination and the
+    /// Writes the rows of a recording's files, one after the other: `log_time`, ns UTC since 1970, then the signals. Returns the
     /// number of rows.
     ///
     /// # Errors
     /// When the destination cannot be written.
-    pub fn export<W: Write + Send>(
+    pub fn export(
         &self,
         players: &mut [Player],
         range: SignalRange,
         format: TableFormat,
-        out: W,
-    ) -> io::Result<(W, u64)> {
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<u64> {
         let mut columns = self.columns();
         let mut writer = TableWriter::new(format, out, &columns)?;
         std::thread::scope(|scope| {
@@ -166,9 +166,8 @@ impl Signals {
             drop(blocks);
             let _ = full.send(columns);
             drop(full);
-            let out =
-                encoder.join().unwrap_or_else(|_| Err(io::Error::other("the encoder panicked; please report it")))?;
-            Ok((out, rows))
+            encoder.join().unwrap_or_else(|_| Err(io::Error::other("the encoder panicked; please report it")))?;
+            Ok(rows)
         })
     }
 

@@ -93,7 +93,7 @@ fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure>
         output::data(layout.contents());
         return Ok(());
     };
-    write_file(path, |mut file| file.write_all(layout.contents().as_bytes()).map(|()| file))
+    write_file(path, |file| file.write_all(layout.contents().as_bytes()))
 }
 
 fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
@@ -116,13 +116,13 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         Some(path) => {
             let mut rows = 0;
             write_file(path, |out| {
-                let (out, written) = signals.export(&mut players, range, format, out)?;
-                rows = written;
-                Ok(out)
+                rows = signals.export(&mut players, range, format, out)?;
+                Ok(())
             })?;
             notice!("{rows} rows: {}", path.display());
         }
-        None => match signals.export(&mut players, range, format, output::Data).and_then(|(mut out, _)| out.flush()) {
+        None => match signals.export(&mut players, range, format, &mut output::Data).and_then(|_| output::Data.flush())
+        {
             // A reader that has read enough is no error.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
             written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,

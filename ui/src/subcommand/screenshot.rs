@@ -124,7 +124,7 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     }
     let picture = film.svg(rate);
     match &arguments.output {
-        Some(path) => write_file(path, |mut file| file.write_all(picture.as_bytes()).map(|()| file)),
+        Some(path) => write_file(path, |file| file.write_all(picture.as_bytes())),
         None => {
             output::data(&picture);
             Ok(())

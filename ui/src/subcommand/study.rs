@@ -279,9 +279,10 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
             table.finish()
         });
     }
-    let mut table = TableWriter::new(format, Vec::new(), &columns).context("the table")?;
+    let mut bytes = Vec::new();
+    let mut table = TableWriter::new(format, &mut bytes, &columns).context("the table")?;
     table.write(&columns).context("the table")?;
-    let bytes = table.finish().context("the table")?;
+    table.finish().context("the table")?;
     output::data(&String::from_utf8_lossy(&bytes));
     Ok(())
 }

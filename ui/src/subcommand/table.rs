@@ -57,11 +57,12 @@ pub fn written_format(given: Option<TableFormat>, file: Option<&Path>) -> Result
 ///
 /// # Errors
 /// When it cannot be written, with the cause.
-pub fn write_file(
-    file: &Path,
-    write: impl FnOnce(BufWriter<File>) -> io::Result<BufWriter<File>>,
-) -> Result<(), Failure> {
-    let whole = |file: File| write(BufWriter::new(file))?.into_inner().map_err(io::IntoInnerError::into_error);
+pub fn write_file(file: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Failure> {
+    let whole = |file: File| {
+        let mut file = BufWriter::new(file);
+        write(&mut file)?;
+        file.into_inner().map_err(io::IntoInnerError::into_error)
+    };
     let failed = |error: io::Error| Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()));
     if fs::symlink_metadata(file).is_ok_and(|about| !about.is_file()) {
         let opened = OpenOptions::new().write(true).truncate(true).open(file);
