@@ -4,7 +4,7 @@ use crate::support::{Console, assert_shows, line_with, proposal, session, tick, 
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
-use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, REMOVED, SKIPPED, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
@@ -533,4 +533,76 @@ fn the_reason_of_a_fault_comes_back_after_an_answer() {
     assert_shows(console.said(), &["g is not possible"]);
     console.wait(6_000);
     assert_eq!(console.said(), format!("FAULT: {cause}"));
+}
+
+/// Regression: after the change of an earlier verdict `u` took the last trial's back, whatever row was selected.
+#[test]
+fn the_last_verdict_is_taken_back_from_another_row_after_a_question_alone() {
+    let mut console = Console::ready();
+    console.judged(2);
+    for verdict in [None, Some(Verdict::Void)] {
+        console.record(Record::Trial(trial(2, verdict, None)));
+    }
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 3, can_undo: true, jumps: 0 }));
+    assert_eq!(console.requests(&["2", "Home", "u"]), [], "trial 0 is selected");
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["Take the last verdict back?", "of trial #2 is taken back", "Press y to take the verdict"]);
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_eq!(console.requests(&["u", "y"]), [OperatorRequest::Undo]);
+    // On its own row, and in another view, it is taken back at once.
+    assert_eq!(console.requests(&["End", "u"]), [OperatorRequest::Undo]);
+    assert_eq!(console.requests(&["Home", "1", "u"]), [OperatorRequest::Undo]);
+}
+
+/// Regression: the robot of a fall, which nobody had stopped, was "STOPPED"; and with another row selected the line hid the trial
+/// that waits.
+#[test]
+fn a_fall_is_no_stop_and_a_waiting_trial_is_named_while_another_row_is_selected() {
+    let mut console = Console::review(Mode::Damped, Verdict::Fall);
+    assert_shows(&console.next_step(), &["FELL; check the robot, then k acknowledges"]);
+    console.record(Record::Trial(trial(1, None, Some(Verdict::Fall))));
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.stage(ExperimentStage::Review, 1);
+    console.press(&["2", "Home"]);
+    assert_shows(&console.next_step(), &["Trial 1 waits for its verdict"]);
+}
+
+/// Regression: a skipped proposal and a point removed from the queue were void trials in the table, its counts and the chart of J.
+#[test]
+fn what_never_ran_is_not_run_and_no_void_trial() {
+    let mut console = Console::ready();
+    console.judged(1);
+    for (number, cause) in [(1, SKIPPED), (2, REMOVED)] {
+        let row = TrialRecord { cause: cause.into(), value: None, ..trial(number, Some(Verdict::Void), None) };
+        console.record(Record::Trial(row));
+    }
+    console.press(&["2"]);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&screen, &["v not run", "0 void, 2 not run"]);
+        assert!(!screen.contains("v void"), "{screen}");
+    }
+}
+
+/// Regression: beyond 17 trials the heading of Trials at 80 columns lost the number of each verdict.
+#[test]
+fn the_counts_of_verdicts_stand_over_a_long_table() {
+    let mut console = Console::ready();
+    console.judged(40);
+    console.press(&["2"]);
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        assert_shows(&console.screen(columns, rows), &[" accept, "]);
+    }
+}
+
+/// Regression: the question before a jump did not tell a changed value from a proposed one.
+#[test]
+fn the_question_before_a_jump_marks_changed_values() {
+    let mut console = Console::ready();
+    let mut changed = proposal(0, 2);
+    (changed.parameters[1].value, changed.gains[0].value) = (80.0, 450.0);
+    console.record(Record::Proposal(changed));
+    console.press(&["g"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["Fx 80.00 N (was 75.00)", "(was 400.0)", "A countdown follows"]);
 }

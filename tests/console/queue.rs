@@ -5,6 +5,7 @@ use std::process::{Command, Output};
 
 use crate::pty::Session;
 use crate::skip::skip;
+use crate::support::line_with;
 
 fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs")
@@ -63,6 +64,11 @@ fn queued_points_are_seen_moved_and_removed() {
 
     let shown = text(&quadfrog(folder.path(), &["study", "show", study.to_str().unwrap()]));
     assert!(shown.contains("0 running, 2 queued\n  #0 f0 1.3, Fx 60, Fz 240\n  #2 f0 1.2, Fx 60, Fz 240"), "{shown}");
+    let report = text(&quadfrog(folder.path(), &["report", study.to_str().unwrap()]));
+    assert!(report.contains("not run"), "{report}");
+    let row = line_with(&report, "go1, simulated");
+    let counts: Vec<&str> = row.split_whitespace().rev().skip(2).take(4).collect();
+    assert_eq!(counts, ["0"; 4], "void, falls, accepted, trials: {report}");
     // A resumed session has the same queue.
     let mut session = Session::start(folder.path(), (80, 24), &["--resume", study.to_str().unwrap()]);
     session.wait_for(&["Press A to arm"]);
@@ -150,4 +156,20 @@ fn a_point_that_is_queued_twice_is_said_to_be() {
     session.wait_for(&["queued once more", "1 more queued (N)"]);
     session.send("N");
     session.wait_for(&["#0    queued", "#1    queued"]);
+}
+
+/// Regression: a point that is queued behind a re-run made its verdict final without a word.
+#[test]
+fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
+    let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["judge it"]);
+    session.send("r");
+    session.wait_for(&["Trial #1, re-run of #0"]);
+    session.send("Q");
+    session.wait_for(&["Queue it once more?"]);
+    session.send("y");
+    session.wait_for(&["the verdict of trial 0 is final now"]);
 }

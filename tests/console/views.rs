@@ -273,7 +273,8 @@ fn the_best_trial_of_an_earlier_session_is_laid_under_the_charts_once_it_is_read
     let ticks = (0..1_000).step_by(5).map(jump).collect();
     console.update(Msg::EarlierJump { trial: 0, ticks });
     console.press(&["c"]);
-    assert_shows(console.said(), &["trial 0 is laid under the charts of a jump"]);
+    // Regression: with one jump in memory a comparison was promised that it cannot give.
+    assert_eq!(console.said(), "trial 0 is laid under the charts of a jump");
 }
 
 /// Twelve trials: accept, fall, void in turn.
