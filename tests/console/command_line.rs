@@ -176,16 +176,17 @@ fn an_incomplete_recording_is_reported_and_can_be_repaired() {
     assert!(cut.is_file(), "the damaged file is kept");
 }
 
-/// Regression: of several failed studies only the first was reported.
+/// Regression: of several failed studies only the first was reported; an output folder that cannot be one was no unusable input.
 #[test]
-fn every_failed_study_is_reported_and_a_disk_error_is_not_unusable_input() {
+fn every_failed_study_is_reported_and_an_unusable_output_folder_is_unusable_input() {
     let program = Program::new();
     // A file in place of the parent folder.
     program.write("taken", "");
     let output = program.run(&["optimize", "--seed", "0-1", "--trials", "1", "--output", "taken"]);
     let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("seed0") && message.contains("seed1"), "{message}");
+    assert!(message.contains("give another folder with --output"), "{message}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Selection of the study to run: a new one, a continued one or a joined one.
 
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use crate::notice;
@@ -34,8 +34,18 @@ impl SelectedStudy {
         if !self.new {
             return Ok(self.clone());
         }
-        let failed = |folder: &Path, source| {
-            Failure::from(EngineError::System { what: format!("{}: cannot be made", folder.display()), source })
+        let failed = |folder: &Path, source: io::Error| {
+            let what = format!("{}: cannot be made", folder.display());
+            match source.kind() {
+                ErrorKind::NotFound
+                | ErrorKind::NotADirectory
+                | ErrorKind::AlreadyExists
+                | ErrorKind::PermissionDenied
+                | ErrorKind::ReadOnlyFilesystem => {
+                    Failure::input(format!("{what}: {source}; give another folder with --output"))
+                }
+                _ => Failure::from(EngineError::System { what, source }),
+            }
         };
         let name = self.folder.display();
         let numbered = (2..).map(|number| PathBuf::from(format!("{name}-{number}")));
