@@ -191,7 +191,7 @@ fn an_error_is_one_plain_line_without_colours_and_repetitions() {
     program.write("recordings", "a file in place of the folder");
     let output = program.command(&["optimize", "--trials", "1"]).env_remove("NO_COLOR").output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(!message.contains('\u{1b}') && !message.contains("BACKTRACE"), "{message}");
     assert_eq!(message.trim_end().lines().count(), 1, "{message}");
     assert_eq!(message.matches("(os error").count(), 1, "the cause stands once: {message}");
