@@ -173,3 +173,21 @@ fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
     session.send("y");
     session.wait_for(&["the verdict of trial 0 is final now"]);
 }
+
+/// Regression: undo dropped the values that were changed for the next proposal without a word, and the sampler's would have run.
+#[test]
+fn undo_says_that_it_drops_the_changed_values_of_the_proposal() {
+    let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["judge it"]);
+    session.send("a");
+    session.wait_for(&["Trial #1, by the sampler"]);
+    session.send("o");
+    session.wait_for(&["Override trial #1"]);
+    session.send("1.2\r");
+    session.wait_for(&["trial 1 will run with f0 1.2 Hz"]);
+    session.send("u");
+    session.wait_for(&["the changed values of proposal 1 are"]);
+}

@@ -60,6 +60,14 @@ impl Experiment {
         }
     }
 
+    /// Returns the number of the open proposal if the operator has changed it.
+    pub fn overridden(&self) -> Option<u32> {
+        match &self.state {
+            ExperimentState::Proposed(open) => open.changes().map(|_| open.number()),
+            _ => None,
+        }
+    }
+
     fn change_open(&mut self) -> Result<&mut OpenProposal, RequestRefusal> {
         match &mut self.state {
             ExperimentState::Proposed(open) => Ok(open),

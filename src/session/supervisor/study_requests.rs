@@ -19,17 +19,32 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
             judged(experiment.void_because(reason, false), format!("{trial} is void"))
         }
         OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
-        OperatorRequest::Undo => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
         _ => {
-            let undoable = experiment.undoable();
-            let mut answer = change(experiment, request).map_err(|refusal| refusal.to_string());
-            let final_now = undoable.filter(|_| experiment.undoable().is_none());
-            if let (Ok(answer), Some(trial)) = (&mut answer, final_now) {
-                *answer += &format!("; the verdict of trial {trial} is final now");
-            }
-            JobOutput::Answer(answer)
+            let (undoable, overridden) = (experiment.undoable(), experiment.overridden());
+            let answer = change(experiment, request).map_err(|refusal| refusal.to_string());
+            JobOutput::Answer(answer.map(|answer| answer + &side_effects(experiment, request, undoable, overridden)))
         }
     }
+}
+
+/// Returns what a change of the study has done beside what it was asked for: made the verdict of the trial `undoable` final, or
+/// dropped the values that the operator had changed in the proposal `overridden`.
+fn side_effects(
+    experiment: &Experiment,
+    request: &OperatorRequest,
+    undoable: Option<u32>,
+    overridden: Option<u32>,
+) -> String {
+    use OperatorRequest::{ClearOverrides, Override, OverrideGain, Skip, Undo};
+    let mut text = String::new();
+    if let Some(trial) = undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
+        text += &format!("; the verdict of trial {trial} is final now");
+    }
+    let meant = matches!(request, ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. });
+    if let Some(trial) = overridden.filter(|_| experiment.overridden().is_none() && !meant) {
+        text += &format!("; the changed values of proposal {trial} are dropped: change them again");
+    }
+    text
 }
 
 /// The answer to a verdict. If another program has ended the trial, the review is over as well.

@@ -7,11 +7,11 @@ use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, 
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 
-use super::request::say;
+use super::request::{cancelled, say};
 use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;
-use crate::model::dialog::{Dialog, Question};
+use crate::model::dialog::{APPROVAL_TIME, Dialog, Question};
 use crate::model::log::LogLine;
 use crate::model::trials::RunTime;
 use crate::model::{Model, Notice};
@@ -50,7 +50,12 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         }
         _ => false,
     };
-    if stale {
+    let expired = |pressed_at: &Duration| model.clock.saturating_sub(*pressed_at) > APPROVAL_TIME;
+    let forgotten = matches!(&model.dialog, Some(Dialog::Approve { pressed_at, .. }) if expired(pressed_at));
+    if forgotten {
+        model.dialog = None;
+        cancelled(model, &format!("no jump, the question was {} s old", APPROVAL_TIME.as_secs()));
+    } else if stale {
         model.dialog = None;
         say(model, LogLevel::Warning, "the question was closed: the situation has changed");
     }

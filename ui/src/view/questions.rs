@@ -186,12 +186,14 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
                 Some(Verdict::Void) => ("void", "Accept a void trial?", "void hides the trial from it"),
                 _ => ("fall", "Accept a fall?", "fall reports 0"),
             };
-            let lines = vec![
+            let mut lines = vec![
                 Line::from(format!("The suggested verdict of trial #{trial} is {suggested}: {}.", row.cause)),
                 Line::from(format!("Accept reports {value} to the optimizer, {otherwise}.")),
-                Line::default(),
-                answers(&model.theme, "y", "accept"),
             ];
+            if row.suggested == Some(Verdict::Void) && row.hand_value.is_none() {
+                lines.push(Line::from("It was measured where the trial ended, which may be in the air."));
+            }
+            lines.extend([Line::default(), answers(&model.theme, "y", "accept")]);
             (title, lines)
         }
         Question::HandValue { trial, value } => {
