@@ -554,7 +554,7 @@ fn the_last_verdict_is_taken_back_from_another_row_after_a_question_alone() {
     assert_eq!(console.requests(&["Home", "1", "u"]), [OperatorRequest::Undo]);
 }
 
-/// Regression: the robot of a fall, which nobody had stopped, was "STOPPED"; and with another row selected the line hid the trial
+/// Regression: after a fall without a STOP the line said "STOPPED", and with another row selected the line hid the trial
 /// that waits.
 #[test]
 fn a_fall_is_no_stop_and_a_waiting_trial_is_named_while_another_row_is_selected() {
