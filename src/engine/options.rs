@@ -141,6 +141,8 @@ pub enum EngineError {
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
     )]
     OtherBackend { study: String, made: String, asked: String },
+    #[error("--trials {budget}: {counted} trials of this study count already; give that number or more, or omit it")]
+    BudgetBelowCounted { budget: u32, counted: u32 },
     #[error(transparent)]
     Prior(#[from] EnsembleError),
     #[error(

@@ -12,9 +12,9 @@ use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::recording::record::SessionInfo;
 use crate::session::experiment::attributes::{
-    self, BackendAttribute, BudgetAttribute, NewStudyAttributes, Origin, StudyAttributes,
+    self, BackendAttribute, BudgetAttribute, NewStudyAttributes, Origin, SamplerAttribute, StudyAttributes,
 };
-use crate::session::experiment::{Experiment, ExperimentPlan};
+use crate::session::experiment::{self, Experiment, ExperimentPlan};
 use crate::trial::{Backend, ParameterInfo, Task};
 
 /// Opens the study of `options` as an experiment, for the console and for `optimize`.
@@ -38,8 +38,8 @@ pub(super) fn open_without_prior(
     let mut study = open_study(options, durability)?;
     let budget = options.budget();
     let worker = if options.join.is_some() { study.join()? } else { 0 };
-    if worker == 0 && StudyAttributes::of(study.attributes()).budget != Some(budget) {
-        study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+    if worker == 0 {
+        take_over(options, &mut study)?;
     }
     let backend = options.backend.name();
     if made_on(&StudyAttributes::of(study.attributes())) != backend {
@@ -64,6 +64,26 @@ pub(super) fn open_without_prior(
         needs_prior: options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none(),
     };
     Ok(Experiment::open(plan, study)?)
+}
+
+/// Keeps budget and sampler of the session that has the study's folder in the study.
+///
+/// # Errors
+/// When more trials count already than are asked for, or the study cannot be written.
+fn take_over(options: &Options, study: &mut Study) -> Result<(), EngineError> {
+    let budget = options.budget();
+    if StudyAttributes::of(study.attributes()).budget != Some(budget) {
+        let counted = experiment::counted(study);
+        if counted > budget {
+            return Err(EngineError::BudgetBelowCounted { budget, counted });
+        }
+        study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
+    }
+    let sampler = attributes::write(&SamplerAttribute { sampler: &study.options().sampler });
+    if sampler.iter().any(|(name, value)| study.attributes().get(name) != Some(value)) {
+        study.annotate_study(&sampler)?;
+    }
+    Ok(())
 }
 
 /// Opens the study of `options`, created if it does not exist, with the prior of the options and the first point of the

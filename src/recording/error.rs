@@ -23,7 +23,7 @@ pub enum RecordingError {
     OtherStudy { path: PathBuf, first: PathBuf, reason: String },
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]
     Empty { path: PathBuf },
-    #[error("{}: not an MCAP file: it begins with {found}; recordings end in .mcap or .mcap.part", path.display())]
+    #[error("{}: not an MCAP file: it begins with {found}; recordings end in .mcap or .mcap.part; give one, or the folder of its study", path.display())]
     NotMcap { path: PathBuf, found: String },
     #[error(
         "{}: an MCAP file, but not a recording of quadfrog: it has no /session message; open it with its own program or with Foxglove",

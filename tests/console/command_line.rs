@@ -265,3 +265,27 @@ fn a_missing_file_is_named_in_words_and_the_usage_says_what_is_required() {
         assert!(!message.contains("os error"), "{message}");
     }
 }
+
+/// Regression: a wrong number was refused with "invalid digit found in string".
+#[test]
+fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
+    let program = Program::new();
+    for (arguments, wanted) in [
+        (&["--trials", "-3"][..], "for '--trials <N>': give a whole number from 1 to 4294967295"),
+        (&["--trials", "abc"], "give a whole number from 1 to 4294967295"),
+        (&["--trials", "0"], "give a whole number from 1 to 4294967295"),
+        (&["--seed", "x"], "for '--seed <N>': give a whole number from 0 to 4294967295"),
+        (&["--seed", "4294967296"], "give a whole number from 0 to 4294967295"),
+        (&["export", "--trial", "x", "session.mcap"], "for '--trial <N>': give a whole number from 0 to 4294967295"),
+        (&["prior", "--jobs", "1.5"], "for '--jobs <N>': give a whole number from 1 to 65535"),
+        (&["study", "list"], "recordings: there is no such folder; give a folder that holds studies"),
+        (&["replay", "notes.txt"], "give one, or the folder of its study"),
+        (
+            &["optimize", "--trials", "1", "--output", "notes.txt/below"],
+            "a part of its path is a file; give another folder with --output",
+        ),
+    ] {
+        program.write("notes.txt", "notes");
+        assert_shows(&program.refused(arguments), &[wanted]);
+    }
+}

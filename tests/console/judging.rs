@@ -5,7 +5,8 @@ use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{Backend, ExperimentStage, REMOVED, SKIPPED, TrialRecord, Verdict};
-use quadfrog_console::message::{Effect, Msg, ReplayStatus};
+use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
+use quadfrog_console::text;
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
 
@@ -582,6 +583,12 @@ fn what_never_ran_is_not_run_and_no_void_trial() {
         assert_shows(&screen, &["v not run", "0 void, 2 not run"]);
         assert!(!screen.contains("v void"), "{screen}");
     }
+    // Regression: the exported table and the log called it void.
+    let table = text::as_csv(&console.model, ExportedRows::All);
+    assert_eq!((table.matches(",not run,").count(), table.matches(",void,").count()), (2, 0), "{table}");
+    console.press(&["6"]);
+    let log = console.screen(120, 40);
+    assert!(log.contains("trial 1: not run") && log.contains("trial 2: not run"), "{log}");
 }
 
 /// Regression: beyond 17 trials the heading of Trials at 80 columns lost the number of each verdict.

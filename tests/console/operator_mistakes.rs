@@ -132,7 +132,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.send(&format!("{DOWN}x"));
     session.wait_for(&["Remove it from the queue?"]);
     session.send("y");
-    session.wait_for(&["trial 3 is removed from the queue"]);
+    session.wait_for(&["remove trial 3 from the queue: it does not run"]);
     session.send(ESCAPE);
     let trial = jump(&mut session);
     judge(&mut session, trial, "a");

@@ -17,11 +17,16 @@ fn text(output: &Output) -> String {
 }
 
 /// A session with an armed robot and three queued points, and the folder of its study.
+/// The study of the only session in `folder`.
+fn study_of(folder: &Path) -> PathBuf {
+    let mut entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
+    entries.find(|path| path.join("study.log").exists()).expect("a study")
+}
+
 fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
     let mut session = Session::start(folder, (120, 40), &["--seed", "3", "--sampler", "random"]);
     session.wait_for(&["Press A to arm"]);
-    let mut entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
-    let study = entries.find(|path| path.join("study.log").exists()).expect("a study");
+    let study = study_of(folder);
     for f0 in ["1.1", "1.2", "1.3"] {
         let point = [&format!("f0={f0}"), "Fx=60", "Fz=240"];
         text(&quadfrog(
@@ -54,7 +59,7 @@ fn queued_points_are_seen_moved_and_removed() {
     session.send("\x1b[Bx");
     session.wait_for(&["Remove it from the queue?", "Trial #1 leaves the queue"]);
     session.send("y");
-    session.wait_for(&["trial 1 is removed from the queue", "#2    queued          f0 1.2"]);
+    session.wait_for(&["remove trial 1 from the queue: it does not run", "#2    queued          f0 1.2"]);
     assert!(!session.screen().contains("#1    queued"), "{}", session.screen());
     session.send("\r");
     session.send("2");
@@ -110,7 +115,7 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     session.send("x");
     session.wait_for(&["Remove it from the queue?"]);
     session.send("y");
-    session.wait_for(&["trial 0 is removed from the queue", "#1    queued          f0 1.2"]);
+    session.wait_for(&["remove trial 0 from the queue: it does not run", "#1    queued          f0 1.2"]);
     session.send("\r");
     session.wait_for(&["Trial #1", "1.200"]);
     session.send("A");
@@ -174,10 +179,10 @@ fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
     session.wait_for(&["the verdict of trial 0 is final now"]);
 }
 
-/// Regression: undo dropped the values that were changed for the next proposal without a word, and the sampler's would have run.
+/// Regression: undo dropped the values that were changed for the next proposal, and so did quitting.
 #[test]
-fn undo_says_that_it_drops_the_changed_values_of_the_proposal() {
-    let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
+fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
+    let (folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.approve();
@@ -189,5 +194,29 @@ fn undo_says_that_it_drops_the_changed_values_of_the_proposal() {
     session.send("1.2\r");
     session.wait_for(&["trial 1 will run with f0 1.2 Hz"]);
     session.send("u");
-    session.wait_for(&["the changed values of proposal 1 are"]);
+    session.wait_for(&["proposal 1 keeps its changed values"]);
+    session.send("a");
+    session.wait_for(&["Trial #1, overridden"]);
+    assert!(session.quit().success());
+    let study = study_of(folder.path());
+    let mut session = Session::start(folder.path(), (120, 40), &["--resume", study.to_str().unwrap()]);
+    session.wait_for(&["Trial #1, overridden"]);
+    session.send("6");
+    session.wait_for(&["kept from before: trial 1 will run with f0 1.2 Hz"]);
+    // A re-run takes the number.
+    session.send("1A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["judge it"]);
+    session.send("a");
+    session.wait_for(&["Trial #2, by the sampler"]);
+    session.send("o");
+    session.wait_for(&["Override trial #2"]);
+    session.send("1.3\r");
+    session.wait_for(&["trial 2 will run with f0 1.3 Hz"]);
+    session.send("u");
+    session.wait_for(&["proposal 2 keeps its changed values"]);
+    session.send("r");
+    session.wait_for(&["the changed values of proposal 2 are"]);
+    assert!(session.quit().success());
 }

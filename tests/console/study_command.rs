@@ -317,6 +317,37 @@ fn a_study_of_gp_that_ended_within_a_trial_continues_with_the_same_bits() {
     }
 }
 
+/// Regression: after `--resume` with another sampler `study show` named that of the study's begin alone.
+#[test]
+fn a_study_names_its_last_sampler_and_which_trials_each_has_proposed() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--sampler", "random", "--record", "none"]);
+    let study = program.study("recordings");
+    let study = study.to_str().unwrap();
+    assert!(!program.text(&["study", "show", study]).contains("proposed:"));
+    program.text(&["optimize", "--resume", study, "--trials", "5", "--sampler", "sobol", "--record", "none"]);
+    let shown = program.text(&["study", "show", study]);
+    assert_shows(&shown, &["proposed: 2 by random (from trial 0), 3 by sobol (from trial 2)", "kind sobol"]);
+    assert!(!shown.contains("kind random"), "{shown}");
+    let table: Vec<String> = program.text(&["study", "export", study]).lines().map(str::to_owned).collect();
+    assert!(table[0].contains("user_attrs_sampler") && table[3].contains("sobol"), "{table:?}");
+}
+
+/// Regression: `--trials` below what counts already lowered the budget of the study for good.
+#[test]
+fn a_budget_below_what_counts_is_refused_and_changes_nothing() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--record", "none"]);
+    let study = program.study("recordings");
+    let journal = || fs::read_to_string(study.join("study.log")).unwrap();
+    let before = journal();
+    let place = study.to_str().unwrap();
+    let refused = program.refused(&["optimize", "--resume", place, "--trials", "2", "--record", "none"]);
+    assert_shows(&refused, &["--trials 2: 3 trials of this study count already; give that number or more"]);
+    assert_eq!(journal(), before);
+    program.text(&["optimize", "--resume", place, "--trials", "3", "--record", "none"]);
+}
+
 /// Regression: attributes of the program's own search were shown as they are stored, `fixed: f0 from 11, trials 1, value 0.97`.
 #[test]
 fn fixed_parameters_and_a_confirmation_are_shown_as_sentences() {

@@ -17,6 +17,28 @@ fn finished() -> Console {
     console
 }
 
+/// Regression: a note opened during a jump, where Space, which is to stop the robot, typed a space.
+#[test]
+fn no_text_field_opens_while_the_robot_jumps() {
+    let mut console = Console::ready();
+    console.judged(1);
+    console.stage(ExperimentStage::Running, 1);
+    console.mode(Mode::Jump);
+    for keys in [&["m"][..], &["6", "/"], &[":"]] {
+        console.press(keys);
+        assert!(console.model.dialog.is_none(), "{keys:?}");
+        let refused = format!("{} is not possible: the robot is jumping, and Space would type", keys[keys.len() - 1]);
+        assert_shows(console.said(), &[&refused]);
+    }
+    // Any key cancels a countdown.
+    console.mode(Mode::Countdown);
+    console.press(&["m"]);
+    assert!(console.model.dialog.is_none());
+    console.mode(Mode::Settle);
+    console.press(&["m"]);
+    assert!(console.model.dialog.is_some());
+}
+
 #[test]
 fn typing_replaces_the_default_of_a_number() {
     let mut console = finished();

@@ -91,6 +91,83 @@ fn changes_of_a_card_are_taken_back_together() {
     assert_eq!((proposal.source, proposal.gains[0].value), (ProposalSource::Sampler, 400.0));
 }
 
+/// Regression: values that were changed for the next trial were lost with an undone verdict and with the end of the program.
+#[test]
+fn changed_values_stay_with_their_trial_over_an_undo_and_over_the_end_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    experiment.set_parameter("Fx", 100.0).unwrap();
+    experiment.set_gain("kp", 500.0).unwrap();
+    let changed = |experiment: &Experiment| {
+        let proposal = experiment.proposal().unwrap();
+        (proposal.trial, proposal.source, value(experiment, "Fx"), proposal.gains[0].value)
+    };
+    let kept = (1, ProposalSource::Operator, 100.0, 500.0);
+    assert_eq!(changed(&experiment), kept);
+    experiment.undo().unwrap();
+    assert_eq!(experiment.changed_proposal(), Some(1), "while the verdict is open");
+    // Another verdict, another draft of the same trial.
+    experiment.judge(Verdict::Fall, false).unwrap();
+    assert_eq!(changed(&experiment), kept);
+    drop(experiment);
+    let mut experiment = open(folder.path());
+    assert_eq!(changed(&experiment), kept);
+    let mut news = News::default();
+    told(&mut experiment, &mut news);
+    assert!(news.log.iter().any(|line| line.contains("trial 1 will run with Fx 100 N, kp 500")), "{:?}", news.log);
+    let spec = accept(&mut experiment);
+    assert_eq!((spec.trial, spec.jump.fx_n, spec.gains.kp), (1, 100.0, 500.0));
+    assert_eq!(experiment.changed_proposal(), None, "the trial has run");
+    assert_ne!(value(&experiment, "Fx"), 100.0);
+    assert_eq!(open(folder.path()).proposal().unwrap().source, ProposalSource::Sampler);
+}
+
+#[test]
+fn changed_values_are_not_given_to_another_point_with_the_same_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    experiment.set_parameter("Fx", 100.0).unwrap();
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Void, true).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.trial, proposal.source, proposal.parent), (1, ProposalSource::Rerun, Some(0)));
+    assert_eq!(experiment.changed_proposal(), None);
+    // Nor do they come back with the sampler's proposal.
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Accept, false).unwrap();
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler);
+
+    // A point that changes its place takes no changes of the one before.
+    experiment.enqueue(&[("Fx".to_owned(), 60.0)]).unwrap();
+    experiment.enqueue(&[("Fx".to_owned(), 70.0)]).unwrap();
+    experiment.set_parameter("Fz", 250.0).unwrap();
+    experiment.move_queued(1, false).unwrap();
+    let proposal = experiment.proposal().unwrap();
+    assert_eq!((proposal.trial, proposal.source, value(&experiment, "Fx")), (1, ProposalSource::Queued, 70.0));
+}
+
+/// A value that is outside the present bounds, or of no parameter, is not restored; nor are values that are no numbers.
+#[test]
+fn only_changed_values_within_the_bounds_are_restored() {
+    let folder = tempfile::tempdir().unwrap();
+    drop(open(folder.path()));
+    for (kept, fx) in [
+        (r#"{"trial":0,"queued":false,"parameters":{"Fx":100,"Fz":1e9,"unknown":1},"gains":{"kp":-5}}"#, Some(100.0)),
+        (r#"{"trial":0,"queued":false,"parameters":{"Fx":"much"},"gains":{}}"#, None),
+        (r#"{"trial":7,"queued":false,"parameters":{"Fx":100},"gains":{}}"#, None),
+        ("[]", None),
+    ] {
+        let kept = serde_json::from_str(kept).unwrap();
+        study_in(folder.path()).annotate_study(&[("changed:0".to_owned(), kept)]).unwrap();
+        let proposal = open(folder.path()).proposal().unwrap();
+        let changed: Vec<_> = proposal.parameters.iter().filter(|p| p.value != p.proposed).collect();
+        assert_eq!(changed.first().map(|p| p.value), fx);
+        assert!(changed.len() <= 1 && proposal.gains.iter().all(|gain| gain.value == gain.proposed));
+    }
+}
+
 #[test]
 fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_proposed() {
     let folder = tempfile::tempdir().unwrap();

@@ -53,6 +53,7 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         }
         A::Note => {
             may_request(model)?;
+            must_not_jump(model)?;
             require(model.trial_in_view().is_some(), "there is no trial yet")
         }
         A::Ghost => {
@@ -64,8 +65,11 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             require(model.view == View::Trials, "only in the view Trials")
         }
         A::Filter | A::Search => {
-            require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")
+            require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")?;
+            let types_text = action == A::Search && model.view == View::Log;
+            if types_text { must_not_jump(model) } else { Ok(()) }
         }
+        A::Palette => must_not_jump(model),
         A::EndComparison => {
             let live = &model.live;
             require(live.comparison.is_some() || live.ghost.is_some(), "no trial is beside or under another")
@@ -110,6 +114,12 @@ pub fn may_acknowledge(model: &Model) -> Legality {
 
 fn require(condition: bool, reason: &str) -> Legality {
     if condition { Ok(()) } else { Err(reason.to_owned()) }
+}
+
+/// A text field would take the Space that is to stop a jump.
+fn must_not_jump(model: &Model) -> Legality {
+    let jumps = matches!(model.mode(), Mode::Countdown | Mode::Jump) && model.replay.is_none();
+    require(!jumps, "the robot is jumping, and Space would type; write after the jump")
 }
 
 fn refuse(reason: impl Into<String>) -> Legality {

@@ -77,7 +77,7 @@ fn export_cells(model: &Model, rows: ExportedRows, write: fn(f64) -> String) -> 
         cells.extend([
             optional(trial.value),
             optional(trial.hand_value),
-            trial.verdict.map_or("", Verdict::name).to_owned(),
+            trial.verdict_name().unwrap_or("").to_owned(),
             trial.suggested.map_or("", Verdict::name).to_owned(),
             trial.cause.clone(),
             trial.source.name().to_owned(),

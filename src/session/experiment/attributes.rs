@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::plan::ExperimentPlan;
-use crate::optimize::ask::SamplerConfig;
+use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
@@ -33,6 +33,12 @@ pub struct NewStudyAttributes<'a> {
     /// Unit of the objective; none for that of the task.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
+}
+
+/// The sampler with which a study was continued last.
+#[derive(Debug, Serialize)]
+pub struct SamplerAttribute<'a> {
+    pub sampler: &'a SamplerConfig,
 }
 
 /// The backend on which a study was continued last.
@@ -74,6 +80,26 @@ pub struct FixedFrom {
     pub trials: u32,
     /// Number of the first trial.
     pub from: u32,
+}
+
+/// Prefix of the study attribute with the changes of a proposal that has not begun, `changed:0` for worker 0.
+pub const CHANGED_PREFIX: &str = "changed:";
+
+/// The operator's changes to a proposal, by name.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Changes {
+    pub parameters: BTreeMap<String, f64>,
+    pub gains: BTreeMap<String, f64>,
+}
+
+/// The operator's changes of a proposal that has not begun.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KeptChanges {
+    pub trial: u32,
+    /// Whether the changed point was queued, and not drafted by the sampler.
+    pub queued: bool,
+    #[serde(flatten)]
+    pub changes: Changes,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -182,6 +208,9 @@ pub struct BeganAttributes {
     /// None on the simulator.
     #[serde(skip_serializing_if = "Option::is_none")]
     backend: Option<&'static str>,
+    /// The sampler that proposed it; none for a queued point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sampler: Option<&'static str>,
     #[serde(skip_serializing_if = "String::is_empty")]
     recording: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -198,13 +227,14 @@ pub struct BeganAttributes {
 
 impl BeganAttributes {
     /// Returns the attributes of a trial of `proposal`; `fixed` holds the parameters that the operator had fixed for some
-    /// trials.
+    /// trials, `sampler` what proposed it.
     pub fn new(
         proposal: &Proposal,
         seed: u64,
         repeats: Vec<RepeatRecord>,
         plan: &ExperimentPlan,
         fixed: ParameterValues,
+        sampler: Option<SamplerKind>,
     ) -> BeganAttributes {
         let gains = proposal.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect();
         let drawn = plan.terrain.filter(|terrain| terrain.friction_range.is_some());
@@ -219,6 +249,7 @@ impl BeganAttributes {
             version: env!("CARGO_PKG_VERSION"),
             worker: plan.worker,
             backend: (plan.backend != Backend::Simulator).then(|| plan.backend.name()),
+            sampler: sampler.map(Into::into),
             recording: plan.recording.clone(),
             risk: proposal.risk,
             expected: proposal.expected,
@@ -292,6 +323,8 @@ pub struct TrialAttributes {
     pub worker: Option<u32>,
     /// The robot on which it ran; none on the simulator.
     pub backend: Option<String>,
+    /// The sampler that proposed it; none for a queued point and for a trial of an earlier version.
+    pub sampler: Option<String>,
     pub risk: Option<FallRisk>,
     /// Parameters that the operator had fixed for some trials.
     #[serde(deserialize_with = "numbers")]

@@ -10,6 +10,7 @@ mod between_repeats;
 mod confirmation;
 mod envelope;
 mod judging;
+mod kept_changes;
 mod liveness;
 mod open_proposal;
 mod plan;
@@ -21,6 +22,7 @@ mod search;
 mod trial_changes;
 mod verdict_change;
 
+pub use self::attributes::CHANGED_PREFIX;
 pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;
@@ -279,7 +281,7 @@ impl Experiment {
         match &self.state {
             ExperimentState::Proposed(open) => {
                 let next = self.study.waiting().next().map(|trial| trial.number);
-                if next != open.waits_as() && open.changes().is_none() {
+                if next != open.waits_as() && !open.is_changed() {
                     self.log("another program has changed the queue: a new proposal follows".to_owned());
                     self.propose()?;
                 }
@@ -379,6 +381,27 @@ impl Experiment {
 /// Whether a trial was measured and waits for the verdict of a person.
 pub fn waits_for_verdict(trial: &Trial) -> bool {
     trial.state == TrialState::Running && TrialAttributes::of(trial).is_unjudged()
+}
+
+/// Returns the number of trials of a stored study that count for its budget.
+pub fn counted(study: &Study) -> u32 {
+    let counts = |trial: &&Trial| trial.state == TrialState::Complete && !attributes::confirms(trial);
+    study.trials().iter().filter(counts).count() as u32
+}
+
+/// Returns how many trials each sampler has proposed and from which trial on, `12 by tpe (from trial 0), 8 by gp (from trial 12)`; none
+/// where one sampler has proposed all.
+pub fn samplers_in_words(study: &Study) -> Option<String> {
+    let mut samplers: Vec<(String, u32, u32)> = Vec::new();
+    for trial in study.trials() {
+        let Some(name) = TrialAttributes::of(trial).sampler else { continue };
+        match samplers.iter_mut().find(|(known, ..)| *known == name) {
+            Some((_, count, _)) => *count += 1,
+            None => samplers.push((name, 1, trial.number)),
+        }
+    }
+    let words = samplers.iter().map(|(name, count, first)| format!("{count} by {name} (from trial {first})"));
+    (samplers.len() > 1).then(|| words.collect::<Vec<_>>().join(", "))
 }
 
 /// Returns the trial table of a stored study: every trial but those that wait.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::attributes::Origin;
+use super::attributes::{Changes, Origin};
 use super::plan::{RequestRefusal, must_be};
 use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
@@ -33,13 +33,6 @@ pub struct OpenProposal {
     gains: ParameterValues,
     /// Parameters of the draft that the operator has fixed for some trials.
     fixed: Vec<(String, f64)>,
-}
-
-/// The operator's changes to a proposal, by name.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Changes {
-    parameters: BTreeMap<String, f64>,
-    gains: BTreeMap<String, f64>,
 }
 
 /// Values of an open proposal at its approval.
@@ -89,37 +82,43 @@ impl OpenProposal {
         (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())
     }
 
-    /// Changes one parameter; the proposed value is no change.
-    pub fn set(&mut self, name: &str, value: f64, revision: u32) {
+    /// Whether its point was queued, and not drafted by the sampler.
+    pub fn is_queued(&self) -> bool {
+        self.draft.enqueued
+    }
+
+    /// Returns its changes with another value of a parameter; the proposed value is no change.
+    pub fn with_parameter(&self, name: &str, value: f64) -> Changes {
         let proposed = self.draft.parameters.iter().any(|p| p.name == name && p.value == value);
-        change(&mut self.changes.parameters, name, value, proposed);
+        let mut changes = self.changes.clone();
+        change(&mut changes.parameters, name, value, proposed);
+        changes
+    }
+
+    /// Returns its changes with another value of a gain; the value that it has without changes is no change.
+    pub fn with_gain(&self, name: &str, value: f64) -> Changes {
+        let mut changes = self.changes.clone();
+        change(&mut changes.gains, name, value, self.gains.get(name) == Some(value));
+        changes
+    }
+
+    pub fn set_changes(&mut self, changes: Changes, revision: u32) {
+        self.changes = changes;
         self.revision = revision;
     }
 
-    /// Changes one gain; the value that it has without changes is no change.
-    pub fn set_gain(&mut self, name: &str, value: f64, revision: u32) {
-        change(&mut self.changes.gains, name, value, self.gains.get(name) == Some(value));
-        self.revision = revision;
-    }
-
-    /// Makes the changes of an earlier proposal, parameters only where `keeps` is true.
-    pub fn inherit(&mut self, earlier: &Changes, revision: u32, keeps: impl Fn(&str, f64) -> bool) {
-        self.revision = revision;
-        for (name, value) in earlier.parameters.iter().filter(|(name, value)| keeps(name, **value)) {
-            self.set(name, *value, revision);
+    /// Makes the changes of an earlier draft of the same trial, where `allows` is true for a parameter or a gain.
+    pub fn inherit(&mut self, earlier: &Changes, allows: impl Fn(&str, f64) -> bool) {
+        for (name, value) in earlier.parameters.iter().filter(|(name, value)| allows(name, **value)) {
+            self.changes = self.with_parameter(name, *value);
         }
-        for (name, value) in &earlier.gains {
-            self.set_gain(name, *value, revision);
+        for (name, value) in earlier.gains.iter().filter(|(name, value)| allows(name, **value)) {
+            self.changes = self.with_gain(name, *value);
         }
     }
 
-    pub fn changes(&self) -> Option<&Changes> {
-        (self.changes != Changes::default()).then_some(&self.changes)
-    }
-
-    pub fn clear(&mut self, revision: u32) {
-        self.changes = Changes::default();
-        self.revision = revision;
+    pub fn is_changed(&self) -> bool {
+        self.changes != Changes::default()
     }
 
     pub fn approved(&self) -> ApprovedProposal {
@@ -166,7 +165,7 @@ impl OpenProposal {
         Proposal {
             trial: self.number(),
             revision: self.revision,
-            source: if self.changes().is_some() { ProposalSource::Operator } else { origin.source },
+            source: if self.is_changed() { ProposalSource::Operator } else { origin.source },
             parent: origin.parent,
             risk: self.risk(&parameters),
             expected: self.expected(&parameters),

@@ -20,7 +20,8 @@ use crate::trial::{
 };
 
 impl Experiment {
-    /// Makes the next proposal, or finishes.
+    /// Makes the next proposal, or finishes. What the operator has changed in an earlier draft of the same trial stays where it is
+    /// within the bounds.
     pub fn propose(&mut self) -> Result<(), StudyError> {
         self.read_study()?;
         if self.plan.needs_prior {
@@ -63,7 +64,8 @@ impl Experiment {
         let fixed: Vec<_> = self.search.fixed(study.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
         let in_study = self.study.waiting().next().is_some();
         let revision = self.next_revision();
-        let open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
+        let mut open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
+        self.restore_changes(&mut open)?;
         let number = open.number();
         if open.lacks_prior() {
             let message = format!("trial {number} is proposed as by gp: the model of sim cannot be fitted");
@@ -71,7 +73,11 @@ impl Experiment {
         }
         self.outbox.push(Record::Insight(open.insight(&model)));
         self.outbox.push(Record::Proposal(open.proposal()));
+        let (returns, changed) = (!matches!(self.state, ExperimentState::Proposed(_)), open.is_changed());
         self.enter(ExperimentState::Proposed(Box::new(open)), number);
+        if returns && changed {
+            self.log(format!("kept from before: {}", self.overrides_in_words()));
+        }
         if let Some(refusal) = self.refusal() {
             self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
@@ -132,24 +138,6 @@ impl Experiment {
             .map(|refusal| refusal.to_string())
     }
 
-    /// Makes a new proposal because the search has changed. The operator's changes stay where they are within the bounds.
-    pub fn repropose(&mut self) -> Result<(), StudyError> {
-        let changes = match &self.state {
-            ExperimentState::Proposed(open) => open.changes().cloned(),
-            _ => None,
-        };
-        self.propose()?;
-        let bounds = self.search.parameters(&self.plan);
-        let within = |name: &str, value: f64| bounds.iter().any(|p| p.name == name && p.contains(value));
-        let Some(changes) = changes else { return Ok(()) };
-        let revision = self.next_revision();
-        if let ExperimentState::Proposed(open) = &mut self.state {
-            open.inherit(&changes, revision, within);
-            self.publish_proposal();
-        }
-        Ok(())
-    }
-
     /// Returns the study at the time at which the next trial begins: the pending verdict is reported in it.
     pub fn study_with_verdict(&self) -> Result<Study, StudyError> {
         let mut fork = self.study.fork();
@@ -182,7 +170,8 @@ impl Experiment {
             draft = self.study.redirected(&draft, number)?;
         }
         let seed = origin.seed().unwrap_or_else(|| self.trial_seed(draft.number));
-        let began = BeganAttributes::new(&proposal, seed, origin.repeats.clone(), &self.plan, fixed);
+        let sampler = (!draft.enqueued).then_some(self.study.options().sampler.kind);
+        let began = BeganAttributes::new(&proposal, seed, origin.repeats.clone(), &self.plan, fixed, sampler);
         let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
         let room = |trials: &[Trial]| beyond_budget || queue.occupied(trials) < budget;

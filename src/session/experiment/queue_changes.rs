@@ -50,11 +50,9 @@ impl Experiment {
     /// Makes a new proposal. The operator's changes of the open one stay, unless another point is `proposed` now.
     fn propose_after_change(&mut self, proposed: bool) -> Result<(), RequestRefusal> {
         if proposed {
-            self.propose()?;
-        } else {
-            self.repropose()?;
+            self.forget_changes()?;
         }
-        Ok(())
+        Ok(self.propose()?)
     }
 
     /// Publishes what another program has changed behind the next point of the queue. The proposal stays.

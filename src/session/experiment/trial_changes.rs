@@ -1,8 +1,7 @@
 //! Changes of the proposal, the search and the queue by the operator. Each request is checked; a refusal names the limit.
 //! Nothing runs before it is approved.
 
-use super::attributes::{self, BudgetAttribute, Origin};
-use super::open_proposal::OpenProposal;
+use super::attributes::{self, BudgetAttribute, Changes, Origin};
 use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
 use super::{Experiment, ExperimentState, confirmation, envelope};
@@ -12,35 +11,28 @@ impl Experiment {
     /// Sets one parameter of the proposal.
     /// Refused when there is no proposal, no such parameter, or the value is outside its bounds.
     pub fn set_parameter(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_open()?;
+        self.open_proposal()?;
         must_be_within(&self.search.parameters(&self.plan), "parameter", name, value)?;
         envelope::must_be_inside(&self.plan, self.hop_share, name, value)?;
-        let revision = self.next_revision();
-        self.change_open()?.set(name, value, revision);
-        self.publish_proposal();
-        Ok(())
+        let changes = self.open_proposal()?.with_parameter(name, value);
+        self.change_open(changes)
     }
 
     /// Sets one of the controller's gains for the proposed trial.
     /// Refused when there is no proposal, no such gain, the gain is a parameter of the study, or the value is outside its safe range.
     pub fn set_gain(&mut self, name: &str, value: f64) -> Result<(), RequestRefusal> {
-        self.change_open()?;
+        self.open_proposal()?;
         if self.plan.optimizes(name) {
             return not_now(format!("{name} is a parameter of this study; set it as a parameter"));
         }
         must_be_within(&self.plan.gains, "gain", name, value)?;
-        let revision = self.next_revision();
-        self.change_open()?.set_gain(name, value, revision);
-        self.publish_proposal();
-        Ok(())
+        let changes = self.open_proposal()?.with_gain(name, value);
+        self.change_open(changes)
     }
 
     /// Takes all changes of the proposal back, also those of gains.
     pub fn clear_overrides(&mut self) -> Result<(), RequestRefusal> {
-        let revision = self.next_revision();
-        self.change_open()?.clear(revision);
-        self.publish_proposal();
-        Ok(())
+        self.change_open(Changes::default())
     }
 
     /// Returns in words what the operator has changed in the proposal, with units.
@@ -57,21 +49,6 @@ impl Experiment {
         match words.is_empty() {
             true => "as it was proposed".to_owned(),
             false => format!("trial {} will run with {}", proposal.trial, words.join(", ")),
-        }
-    }
-
-    /// Returns the number of the open proposal if the operator has changed it.
-    pub fn overridden(&self) -> Option<u32> {
-        match &self.state {
-            ExperimentState::Proposed(open) => open.changes().map(|_| open.number()),
-            _ => None,
-        }
-    }
-
-    fn change_open(&mut self) -> Result<&mut OpenProposal, RequestRefusal> {
-        match &mut self.state {
-            ExperimentState::Proposed(open) => Ok(open),
-            _ => not_now("there is no proposal to change"),
         }
     }
 
@@ -143,7 +120,7 @@ impl Experiment {
     /// Writes bounds and fixed parameters, and makes a new proposal with them.
     fn write_search(&mut self) -> Result<(), RequestRefusal> {
         self.study.annotate_study(&self.search.attributes())?;
-        Ok(self.repropose()?)
+        Ok(self.propose()?)
     }
 
     /// Queues the parameters of an earlier trial again, with its gains.

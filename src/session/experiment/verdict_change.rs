@@ -49,7 +49,7 @@ impl Experiment {
             (row.verdict, row.value, row.cause) = (Some(verdict), value, cause);
         }
         self.publish_row(trial);
-        self.repropose()?;
+        self.propose()?;
         if let Some(best) = self.model_best.filter(|_| self.pending_verdict.is_none()) {
             self.study.store_best(best)?;
         }

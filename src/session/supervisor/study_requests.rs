@@ -7,9 +7,10 @@ use crate::trial::{Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
+    let (undoable, changed) = (experiment.undoable(), experiment.changed_proposal());
     let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
     let again = format!("{trial} is void, and its parameters are proposed again");
-    match request {
+    let output = match request {
         OperatorRequest::Judge(verdict) => {
             let answer = format!("{trial}; u takes it back until the next trial is approved or skipped");
             judged(experiment.judge(*verdict, false), answer)
@@ -19,30 +20,37 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
             judged(experiment.void_because(reason, false), format!("{trial} is void"))
         }
         OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
-        _ => {
-            let (undoable, overridden) = (experiment.undoable(), experiment.overridden());
-            let answer = change(experiment, request).map_err(|refusal| refusal.to_string());
-            JobOutput::Answer(answer.map(|answer| answer + &side_effects(experiment, request, undoable, overridden)))
-        }
+        _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
+    };
+    let say = |answer: String| answer + &side_effects(experiment, request, undoable, changed);
+    match output {
+        JobOutput::Answer(answer) => JobOutput::Answer(answer.map(say)),
+        JobOutput::Judged(answer, over) => JobOutput::Judged(answer.map(say), over),
+        other => other,
     }
 }
 
-/// Returns what a change of the study has done beside what it was asked for: made the verdict of the trial `undoable` final, or
-/// dropped the values that the operator had changed in the proposal `overridden`.
+/// Returns what a request has done beside what it was asked for: made the verdict of the trial `undoable` final, or kept or
+/// dropped the values that the operator had changed in the proposal `changed`.
 fn side_effects(
     experiment: &Experiment,
     request: &OperatorRequest,
     undoable: Option<u32>,
-    overridden: Option<u32>,
+    changed: Option<u32>,
 ) -> String {
-    use OperatorRequest::{ClearOverrides, Override, OverrideGain, Skip, Undo};
+    use OperatorRequest::{ClearOverrides, Judge, Override, OverrideGain, Skip, Undo};
     let mut text = String::new();
     if let Some(trial) = undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
         text += &format!("; the verdict of trial {trial} is final now");
     }
-    let meant = matches!(request, ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. });
-    if let Some(trial) = overridden.filter(|_| experiment.overridden().is_none() && !meant) {
-        text += &format!("; the changed values of proposal {trial} are dropped: change them again");
+    let Some(trial) = changed else { return text };
+    match request {
+        ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. } => {}
+        _ if experiment.changed_proposal().is_none() => {
+            text += &format!("; the changed values of proposal {trial} are dropped: change them again");
+        }
+        Undo | Judge(_) => text += &format!("; proposal {trial} keeps its changed values"),
+        _ => {}
     }
     text
 }
@@ -133,7 +141,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         },
         OperatorRequest::RemoveQueued { trial } => {
             experiment.remove_queued(*trial)?;
-            format!("trial {trial} is removed from the queue")
+            "it does not run".to_owned()
         }
         OperatorRequest::MoveQueued { trial, earlier } => {
             experiment.move_queued(*trial, *earlier)?;

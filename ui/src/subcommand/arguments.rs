@@ -1,6 +1,9 @@
 //! Arguments that several commands share, and parsers for the engine's named values.
 
+use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use crate::notice;
 use clap::Args;
@@ -28,6 +31,17 @@ pub fn one_of<T: Copy + Send + Sync + 'static>(
     PossibleValuesParser::new(values).try_map(move |text| {
         rows.iter().find(|(_, name, _)| *name == text).map(|(value, ..)| *value).ok_or("not one of the values")
     })
+}
+
+/// Parses a whole number within a range; unlike clap's own parser it says what is asked for.
+pub fn whole_number<T>(range: RangeInclusive<T>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static,
+{
+    move |text: &str| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("give a whole number from {} to {}", range.start(), range.end()))
+    }
 }
 
 /// Parses a task.
@@ -104,7 +118,7 @@ pub fn user_folder() -> Option<PathBuf> {
 #[derive(Debug, Clone, Args)]
 pub struct StudyArguments {
     /// Budget: number of trials that count [default: from optimize.toml]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_number(1_u32..=u32::MAX))]
     pub trials: Option<u32>,
     /// Folder whose TOML files replace those of the configuration, whole or key by key [default: ~/.config/quadfrog if it
     /// exists]
@@ -170,7 +184,7 @@ pub struct DdsArguments {
     #[arg(long, value_name = "NAME")]
     pub interface: Option<String>,
     /// DDS domain of a Go2 [default: from its robot.toml; 1 for an emulated robot]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
+    #[arg(long, value_name = "N", value_parser = whole_number(0_u16..=232))]
     pub domain: Option<u16>,
 }
 

@@ -25,7 +25,7 @@ use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::{HardwareError, Network};
 use quadfrog::trial::{Approval, Backend, Task};
 
-use super::arguments::{self, DEFAULT_MODEL, DdsArguments, RealRobot, StudyArguments, one_of};
+use super::arguments::{self, DEFAULT_MODEL, DdsArguments, RealRobot, StudyArguments, one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
 use super::live;
@@ -123,7 +123,7 @@ pub struct ConsoleArguments {
     #[arg(long, value_name = "TASK", value_parser = arguments::task())]
     task: Option<Task>,
     /// Seed of the study [default: from optimize.toml]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_number(0_u32..=u32::MAX))]
     seed: Option<u32>,
     #[command(flatten)]
     study: StudyArguments,

@@ -20,7 +20,7 @@ use quadfrog::robot::go2::network::Go2Network;
 use quadfrog::robot::hardware::Network;
 use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, EmulatorStatus};
 
-use super::arguments::{self, DdsArguments, RealRobot, load_model, one_of};
+use super::arguments::{self, DdsArguments, RealRobot, load_model, one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
 
@@ -44,7 +44,7 @@ pub struct EmulateArguments {
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8007")]
     bind: SocketAddr,
     /// Seed of all random numbers: sensors, terrain, network
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole_number(0_u64..=u64::MAX))]
     seed: u64,
     /// Robot to emulate
     #[arg(long, value_name = "WHICH", default_value = "go1", value_parser = robot())]

@@ -13,7 +13,7 @@ use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
 
-use super::arguments::one_of;
+use super::arguments::{one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
 use super::table::{table_format, write_file, written_format};
@@ -49,7 +49,7 @@ pub struct ExportArguments {
     #[arg(long, value_name = "VIEWER", conflicts_with_all = ["file", "trial", "time", "topic", "format"])]
     layout: Option<LayoutOf>,
     /// Export the ticks of one trial
-    #[arg(long, value_name = "N", conflicts_with = "time", add = ArgValueCandidates::new(completion::trials))]
+    #[arg(long, value_name = "N", conflicts_with = "time", value_parser = whole_number(0_u32..=u32::MAX), add = ArgValueCandidates::new(completion::trials))]
     trial: Option<u32>,
     /// Export the ticks from time A to before time B, s since the session began; both may be left out, as in 12.5..
     #[arg(long, value_name = "A..B", value_parser = parse_times)]
@@ -119,7 +119,8 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
                 rows = signals.export(&mut players, range, format, out)?;
                 Ok(())
             })?;
-            notice!("{rows} rows: {}", path.display());
+            let size_mb = std::fs::metadata(path).map_or(0.0, |about| about.len() as f64 / 1e6);
+            notice!("{rows} rows, {size_mb:.1} MB: {}", path.display());
         }
         None => match signals.export(&mut players, range, format, &mut output::Data).and_then(|_| output::Data.flush())
         {

@@ -18,7 +18,7 @@ use quadfrog::session::prior::{PriorProgress, ensemble};
 use quadfrog::trial::Task;
 use serde_json::json;
 
-use super::arguments;
+use super::arguments::{self, whole_number};
 use super::completion;
 use super::failure::Failure;
 
@@ -37,7 +37,7 @@ pub struct PriorArguments {
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Jumps at the same time; the prior does not depend on it [default: the number of cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u16..=u16::MAX))]
     jobs: Option<u16>,
     /// Print one JSON object on standard output
     #[arg(long)]

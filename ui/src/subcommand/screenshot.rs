@@ -16,7 +16,7 @@ use clap::Args;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
 
-use super::arguments;
+use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
 use super::failure::Failure;
 use super::replay::recorded_robot;
@@ -28,7 +28,7 @@ pub struct ScreenshotArguments {
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Show the end of this trial [default: the end of the recording]
-    #[arg(long, value_name = "N", conflicts_with = "time")]
+    #[arg(long, value_name = "N", conflicts_with = "time", value_parser = whole_number(0_u32..=u32::MAX))]
     trial: Option<u32>,
     /// Show this time, s since the recording began
     #[arg(long, value_name = "S", value_parser = parse_time)]
@@ -37,7 +37,7 @@ pub struct ScreenshotArguments {
     #[arg(long, value_name = "S", value_parser = parse_length)]
     animate: Option<f64>,
     /// Frames of a moving picture in a second
-    #[arg(long, value_name = "N", default_value_t = 8, requires = "animate", value_parser = clap::value_parser!(u8).range(1..=30))]
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "animate", value_parser = whole_number(1_u8..=30))]
     frames_per_second: u8,
     /// Keys pressed before, as in a replay: 2 for Trials, Enter for its details; separated by spaces
     #[arg(long, value_name = "KEYS", default_value = "1", value_parser = parse_keys)]

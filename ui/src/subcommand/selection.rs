@@ -37,11 +37,10 @@ impl SelectedStudy {
         let failed = |folder: &Path, source: io::Error| {
             let what = format!("{}: cannot be made", folder.display());
             match source.kind() {
-                ErrorKind::NotFound
-                | ErrorKind::NotADirectory
-                | ErrorKind::AlreadyExists
-                | ErrorKind::PermissionDenied
-                | ErrorKind::ReadOnlyFilesystem => {
+                ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
+                    Failure::input(format!("{what}: a part of its path is a file; give another folder with --output"))
+                }
+                ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
                     Failure::input(format!("{what}: {source}; give another folder with --output"))
                 }
                 _ => Failure::from(EngineError::System { what, source }),

@@ -1,6 +1,7 @@
 //! `quadfrog study`: stored studies, of this program and of other Optuna programs.
 
 use std::fmt::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::{notice, output};
@@ -15,7 +16,7 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
-use quadfrog::session::experiment::{self, confirmation_in_words, rows_of};
+use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, rows_of};
 use quadfrog::session::operator_request::counted;
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
 use serde_json::Value;
@@ -131,8 +132,13 @@ impl StudySelector {
 }
 
 fn list(folder: &Path) -> Result<(), Failure> {
-    let files = study_files(folder)
-        .map_err(|error| Failure::input(format!("{}: {error}; give a folder that holds studies", folder.display())))?;
+    let files = study_files(folder).map_err(|error| {
+        let (cause, remedy) = match error.kind() {
+            ErrorKind::NotFound => ("there is no such folder".to_owned(), "; the first session makes recordings"),
+            _ => (error.to_string(), ""),
+        };
+        Failure::input(format!("{}: {cause}; give a folder that holds studies{remedy}", folder.display()))
+    })?;
     if files.is_empty() {
         output::text(&format!("There is no study in {}\n", folder.display()));
         return Ok(());
@@ -196,8 +202,8 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let Opened { study, ours, parameters } = &opened;
     let mut text = String::new();
     let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
-    // The causes of changed verdicts stand in the table.
-    let own = |name: &str| ours.is_some() && OWN_SENTENCES.contains(&name);
+    // The causes of changed verdicts stand in the table; the values that are changed for the next trial are the console's.
+    let own = |name: &str| ours.is_some() && (OWN_SENTENCES.contains(&name) || name.starts_with(CHANGED_PREFIX));
     let left_out = |name: &str, value: &Value| name.starts_with(CHANGED_VERDICT) || value.is_null() || own(name);
     for (name, value) in study.attributes().iter().filter(|(name, value)| !left_out(name, value)) {
         let (name, between) =
@@ -212,6 +218,9 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
             };
             let trials = counted(trials as u32, "counted trial");
             let _ = writeln!(text, "  {name} was fixed at {} for {trials}, from trial {from}", six_digits(value));
+        }
+        if let Some(samplers) = experiment::samplers_in_words(study) {
+            let _ = writeln!(text, "  proposed: {samplers}");
         }
         if let Some(confirmation) = confirmation_in_words(study) {
             let _ = writeln!(text, "  confirmation of the best: {confirmation}");

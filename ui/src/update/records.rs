@@ -257,7 +257,7 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
                 ProposalSource::Sampler => String::new(),
                 other => format!(" ({})", other.name()),
             };
-            format!("trial {}{source}: {}{value}", trial.trial, verdict.name())
+            format!("trial {}{source}: {}{value}", trial.trial, trial.verdict_name().unwrap_or(verdict.name()))
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {
             let cause = if trial.cause.is_empty() { String::new() } else { format!(" ({})", trial.cause) };

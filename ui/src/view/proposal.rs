@@ -133,7 +133,7 @@ fn risk(theme: &Theme, risk: Option<FallRisk>) -> Line<'static> {
     let role = if risk.falls * 2 >= risk.neighbours { Role::Warning } else { Role::Quiet };
     let mut text = format!(" {} of the {} nearest fell", risk.falls, risk.neighbours);
     if let (Some(distance), Some(trial)) = (risk.nearest_fall, risk.nearest_fall_trial) {
-        text.push_str(&format!("; nearest fall #{trial}, normalised distance {distance:.2}"));
+        text.push_str(&format!("; nearest fall #{trial}, at {distance:.2} of the bounds"));
     }
     Line::from(span(theme, role, text))
 }
@@ -184,7 +184,7 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
     let mut lines = vec![Line::from(vec![
         span(theme, Role::Quiet, " best "),
         span(theme, Role::Good, format!("{value} {}", session.info.unit)),
-        span(theme, Role::Quiet, format!(" (#{})", best.trial)),
+        span(theme, Role::Quiet, format!(" (#{}{})", best.trial, if best.counts_by_hand() { ", by hand" } else { "" })),
     ])];
     if let Some(PredictedTrial { value, deviation, .. }) = session.trials.model_best {
         let text = format!(" its mean by the model {}", with_deviation(theme, value, deviation, &session.info.unit));

@@ -26,6 +26,7 @@ use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{Backend, Task};
 
+use super::super::arguments::whole_number;
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::subcommand::failure::Failure;
 
@@ -42,7 +43,7 @@ pub struct LoopArguments {
     #[arg(long, value_name = "S", default_value_t = 10.0)]
     seconds: f64,
     /// SCHED_FIFO priority, of cyclictest too; 0 is an ordinary thread
-    #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    #[arg(long, value_name = "P", default_value_t = 80, value_parser = whole_number(0_u8..=99))]
     priority: u8,
     /// Use the Go1's link to an emulated robot in this program instead of the simulator
     #[arg(long)]
@@ -54,7 +55,7 @@ pub struct LoopArguments {
     #[arg(long)]
     cyclictest: bool,
     /// Number of alternations
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = whole_number(1_u32..=100))]
     turns: u32,
 }
 

@@ -46,7 +46,8 @@ fn write_section(page: &mut String, section: &SectionReference) {
     }
     page.push_str("\n| key | default | range | on hardware | meaning |\n|---|---|---|---|---|\n");
     for KeyReference { name, default, range, hardware_range, comment } in &section.keys {
-        let (range, hardware) = (in_words(*range), in_words(*hardware_range));
+        let range = if default.is_bool() { "true or false".to_owned() } else { in_words(*range) };
+        let hardware = in_words(*hardware_range);
         let default = default.to_string().replace('|', "\\|");
         let _ = writeln!(page, "| `{name}` | `{default}` | {range} | {hardware} | {} |", escaped(comment));
     }

@@ -22,7 +22,7 @@ use quadfrog::telemetry::TrialSpec;
 use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
 use serde_json::json;
 
-use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds};
+use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds, whole_number};
 use super::completion;
 use super::failure::Failure;
 use quadfrog::session::parallel::{cores, in_parallel};
@@ -60,7 +60,7 @@ pub struct EvaluateArguments {
     #[arg(long)]
     json: bool,
     /// Runs at the same time; the results do not depend on it [default: the number of cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u16..=u16::MAX))]
     jobs: Option<u16>,
 }
 

@@ -26,7 +26,7 @@ use quadfrog::trial::{Approval, Backend, Task, Verdict};
 use printer::Printer;
 use recorder::{RecordedRollout, StudyRecorder};
 
-use super::arguments::{self, Seeds, StudyArguments, parse_seeds};
+use super::arguments::{self, Seeds, StudyArguments, parse_seeds, whole_number};
 use super::failure::Failure;
 use super::prior;
 use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
@@ -69,7 +69,7 @@ pub struct OptimizeArguments {
     #[arg(long, value_name = "WHAT", default_value = "best")]
     record: RecordChoice,
     /// Studies that run at the same time [default: the number of cores]; with --join: workers [default: 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u16..=u16::MAX))]
     jobs: Option<u16>,
 }
 

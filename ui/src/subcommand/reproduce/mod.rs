@@ -20,6 +20,7 @@ use quadfrog::session::parallel::cores;
 
 use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
+use super::arguments::whole_number;
 use super::failure::Failure;
 
 /// Name of the results in the output folder.
@@ -40,13 +41,13 @@ pub struct ReproduceArguments {
     only: Vec<PaperExperiment>,
     /// First seed: studies have this one and the next four, runs those from 100 above on. The examples name and were chosen on
     /// others
-    #[arg(long, value_name = "N", default_value_t = 2000)]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole_number(0_u32..=u32::MAX))]
     seed: u32,
     /// Most trials of a study
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u32..=u32::MAX))]
     trials: Option<u32>,
     /// Threads; the results do not depend on it [default: the number of cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u16..=u16::MAX))]
     jobs: Option<u16>,
     /// Make the report of these results and run nothing
     #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "only", "seed", "trials", "jobs"])]

@@ -2,7 +2,7 @@
 
 use crossterm::event::KeyCode;
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::trial::six_digits;
+use quadfrog::trial::{TrialRecord, six_digits};
 use tui_input::{Input, InputRequest};
 
 use crate::action::Action;
@@ -151,7 +151,11 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
         return if known {
             Ok(ReplayCommand::Trial(trial))
         } else {
-            Err(format!("trial {trial} is not in this recording"))
+            let row = model.session.trials.records.get(&trial);
+            Err(match row.is_some_and(TrialRecord::was_not_run) {
+                true => format!("trial {trial} was not run: there is no jump to show"),
+                false => format!("trial {trial} is not in this recording"),
+            })
         };
     }
     let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds), #7 (a trial) or best");
