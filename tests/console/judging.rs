@@ -3,7 +3,7 @@
 use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
+use quadfrog::telemetry::{FallCause, Mode, Phase, Snapshot, Tick, TransitionCause};
 use quadfrog::trial::{Backend, ExperimentStage, REMOVED, SKIPPED, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
 use quadfrog_console::text;
@@ -566,6 +566,21 @@ fn a_fall_is_no_stop_and_a_waiting_trial_is_named_while_another_row_is_selected(
     console.stage(ExperimentStage::Review, 1);
     console.press(&["2", "Home"]);
     assert_shows(&console.next_step(), &["Trial 1 waits for its verdict"]);
+}
+
+/// Regression: after the verdict on a detected fall the robot was STOPPED, which nobody had done.
+#[test]
+fn a_robot_that_fell_is_not_called_stopped_after_the_verdict() {
+    let mut console = Console::review(Mode::Jump, Verdict::Fall);
+    let cause = TransitionCause::Fell(FallCause::BodyContact).to_string();
+    console.record(Record::Transition(Transition { from: Mode::Jump, to: Mode::Damped, cause }));
+    console.mode_of_ticks(Mode::Damped);
+    assert_shows(&console.next_step(), &["FELL; check the robot"]);
+    console.record(Record::Trial(trial(0, Some(Verdict::Fall), Some(Verdict::Fall))));
+    console.stage(ExperimentStage::Proposed, 1);
+    assert_shows(&console.next_step(), &["FELL; check the robot, then k acknowledges: fell: "]);
+    console.press(&["m"]);
+    assert_shows(&console.next_step(), &["FELL: Esc, then k acknowledges"]);
 }
 
 /// Regression: a skipped proposal and a point removed from the queue were void trials in the table, its counts and the chart of J.

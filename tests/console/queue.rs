@@ -220,3 +220,16 @@ fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     session.wait_for(&["the changed values of proposal 2 are"]);
     assert!(session.quit().success());
 }
+
+/// Regression: a parameter that was fixed changed the other values of the shown proposal without a word.
+#[test]
+fn a_change_of_the_search_says_that_the_proposal_is_drawn_again() {
+    let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
+    session.send("4");
+    session.wait_for(&["fix f0 at"]);
+    session.send("X");
+    session.wait_for(&["for how many trials"]);
+    session.send("3\r");
+    session.wait_for(&["proposal 0 is drawn again"]);
+    assert!(session.quit().success());
+}

@@ -232,8 +232,41 @@ fn every_key_of_a_replay_is_seen() {
     let mut session = Session::run(folder.path(), (120, 40), command);
     session.wait_for(&["p pauses"]);
     play(&mut session, REPLAY);
-    let exported = std::fs::read_to_string(folder.path().join("trials.csv")).expect("the exported table");
+    let exported = std::fs::read_to_string(folder.path().join("trials-replay.csv")).expect("the exported table");
     assert_eq!(exported.lines().count(), 4, "{exported}");
+    session.send("q");
+    assert!(session.wait().success());
+}
+
+/// Regression: the table that a replay wrote replaced that of the session, with the verdicts up to the playhead.
+#[test]
+fn a_replay_exports_the_table_of_its_end_and_leaves_that_of_the_session() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("trials.csv"), "of the session").expect("written");
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.arg("replay");
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap"));
+    let mut session = Session::run(folder.path(), (120, 40), command);
+    session.wait_for(&["p pauses"]);
+    let file = folder.path().join("trials-replay.csv");
+    session.send("p2");
+    session.wait_for(&["paused"]);
+    let tables = [("G#1\r", "1 after the playhead"), (")", "1 void")].map(|(place, shown)| {
+        session.send(place);
+        session.wait_for(&[shown]);
+        session.send("e");
+        session.wait_for(&["written: all 3 trials"]);
+        let table = std::fs::read_to_string(&file).expect("the exported table");
+        std::fs::remove_file(&file).expect("removed");
+        table
+    });
+    assert_eq!(tables[0], tables[1]);
+    assert!(
+        tables[0].lines().skip(1).all(|line| line.contains(",accept,") || line.contains(",fall,")),
+        "{}",
+        tables[0]
+    );
+    assert_eq!(std::fs::read_to_string(folder.path().join("trials.csv")).expect("read"), "of the session");
     session.send("q");
     assert!(session.wait().success());
 }

@@ -332,7 +332,7 @@ impl Console {
                     ExportedRows::Shown => format!("{shown} of {all} trials, {} left out", all - shown.min(all)),
                 };
                 self.say_written(written, |path| {
-                    format!("written: {count}, {} and trials.md beside it", path.display())
+                    format!("written: {count}, {} and the same as .md beside it", path.display())
                 });
             }
             Effect::ExportBest => {

@@ -20,12 +20,13 @@ fn folder(model: &Model) -> PathBuf {
     folder.map_or_else(PathBuf::new, Path::to_owned)
 }
 
-/// Writes the trial table, `trials.csv` and `trials.md`; returns the first.
+/// Writes the trial table, `trials.csv` and `trials.md`; returns the first. That of a replay, `trials-replay.csv`, does not replace the
+/// table of the session.
 ///
 /// # Errors
 /// When one of them cannot be written.
 pub fn table(model: &Model, rows: ExportedRows) -> anyhow::Result<PathBuf> {
-    let csv = folder(model).join("trials.csv");
+    let csv = folder(model).join(if model.replay.is_some() { "trials-replay.csv" } else { "trials.csv" });
     write(&csv, &text::as_csv(model, rows))?;
     write(&csv.with_extension("md"), &text::as_markdown(model, rows))?;
     Ok(csv)

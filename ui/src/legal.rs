@@ -49,7 +49,10 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Rerun => may_rerun(model),
         A::Undo => {
             may_request(model)?;
-            require(model.session.stage.is_some_and(|info| info.can_undo), "no verdict can be taken back")
+            require(
+                model.session.stage.is_some_and(|info| info.can_undo),
+                "no verdict can be taken back; to change one, select its row in Trials",
+            )
         }
         A::Note => {
             may_request(model)?;

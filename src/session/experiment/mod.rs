@@ -89,6 +89,8 @@ pub struct Experiment {
     queue: TrialQueue,
     search: SearchSettings,
     confirmation: BestConfirmation,
+    /// The result of a confirmation that has just ended, in words.
+    concluded: Option<String>,
     outbox: Vec<Record>,
     published_search: Option<SearchStatus>,
     /// Share of the force bounds that the next trial may use.
@@ -111,6 +113,7 @@ impl Experiment {
             revisions: 0,
             pending_verdict: None,
             search: SearchSettings::default(),
+            concluded: None,
             outbox: Vec::new(),
             published_search: None,
             hop_share: None,
@@ -140,6 +143,11 @@ impl Experiment {
     /// Takes the records since the last call, for the console and the recording.
     pub fn take_records(&mut self) -> Vec<Record> {
         std::mem::take(&mut self.outbox)
+    }
+
+    /// Takes the result of a confirmation of the best that has ended since the last call, in words.
+    pub fn take_conclusion(&mut self) -> Option<String> {
+        self.concluded.take()
     }
 
     /// Returns the stage of the current trial.

@@ -35,7 +35,8 @@ impl Experiment {
                     study.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
                 }
                 NextRepeat::Over(conclusion, message) => {
-                    self.log(message);
+                    self.log(message.clone());
+                    self.concluded = Some(message);
                     self.confirmation.conclude(conclusion);
                 }
                 NextRepeat::None => {}

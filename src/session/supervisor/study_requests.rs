@@ -3,11 +3,14 @@
 use crate::session::experiment::{Experiment, RequestRefusal};
 use crate::session::operator_request::{OperatorRequest, counted};
 use crate::session::storage::JobOutput;
-use crate::trial::{Verdict, six_digits};
+use crate::trial::{Proposal, Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
     let (undoable, changed) = (experiment.undoable(), experiment.changed_proposal());
+    use OperatorRequest::{ChangeVerdict, Fix, NarrowBounds, Unfix};
+    let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
+    let drawn = experiment.proposal().filter(|_| searches);
     let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
     let again = format!("{trial} is void, and its parameters are proposed again");
     let output = match request {
@@ -22,7 +25,18 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
         OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
         _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
     };
-    let say = |answer: String| answer + &side_effects(experiment, request, undoable, changed);
+    let mut more = side_effects(experiment, request, undoable, changed);
+    let values = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.proposed).collect::<Vec<_>>();
+    if let (Some(before), Some(now)) = (drawn, experiment.proposal())
+        && before.trial == now.trial
+        && values(&before) != values(&now)
+    {
+        more += &format!("; proposal {} is drawn again", now.trial);
+    }
+    if let Some(conclusion) = experiment.take_conclusion() {
+        more += &format!("; {conclusion}");
+    }
+    let say = |answer: String| answer + &more;
     match output {
         JobOutput::Answer(answer) => JobOutput::Answer(answer.map(say)),
         JobOutput::Judged(answer, over) => JobOutput::Judged(answer.map(say), over),

@@ -125,6 +125,11 @@ impl Console {
     pub fn mode(&mut self, mode: Mode) {
         let from = self.model.mode();
         self.record(Record::Transition(Transition { from, to: mode, cause: "test".into() }));
+        self.mode_of_ticks(mode);
+    }
+
+    /// The ticks say that the robot is in `mode`; the change was reported by itself.
+    pub fn mode_of_ticks(&mut self, mode: Mode) {
         let tick = Tick { mode, ..self.model.snapshot.tick };
         self.update(Msg::Snapshot(Box::new(Snapshot { tick, ..self.model.snapshot })));
     }

@@ -12,6 +12,7 @@ pub(crate) mod rejudged;
 pub mod session;
 pub(crate) mod trials;
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::time::Duration;
 
@@ -352,11 +353,11 @@ impl Model {
         self.trial_table.rows(&self.session.trials, self.later_trials(), &self.session.info.parameters, waiting)
     }
 
-    /// Every trial, by number: also those that the table does not show.
+    /// Every trial, by number: also those that the table does not show, in a replay as at its end.
     pub fn every_trial(&self) -> Vec<&TrialRecord> {
-        let mut rows: Vec<&TrialRecord> = self.session.trials.records.values().chain(self.later_trials()).collect();
-        rows.sort_by_key(|row| row.trial);
-        rows
+        let recorded = self.timeline.iter().flat_map(|timeline| timeline.rows.iter());
+        let rows: BTreeMap<&u32, &TrialRecord> = self.session.trials.records.iter().chain(recorded).collect();
+        rows.into_values().collect()
     }
 
     /// The trials of a replay that are not proposed yet at the playhead, as they will be at the end.

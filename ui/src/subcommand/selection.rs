@@ -127,6 +127,10 @@ pub fn study_to_continue(
     robot: &RobotDescription,
 ) -> Result<SelectedStudy, Failure> {
     let file = folder.join(STUDY_FILE);
+    if folder.is_file() {
+        let name = folder.display();
+        return Err(Failure::Input(format!("{name}: this is a file; give the folder of the study that it lies in")));
+    }
     if !file.is_file() {
         return Err(Failure::Input(format!(
             "{}: there is no {STUDY_FILE} in this folder; give the folder of an earlier study, as printed at its end",

@@ -119,7 +119,8 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     ExperimentStage::Finished => {
                         let best = model.session.trials.best_value();
                         let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
-                            format!("the best is trial {trial}, J = {value:.3} {}", model.session.info.unit)
+                            let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
+                            format!("the best is trial {trial}, J = {value:.3} {}{by_hand}", model.session.info.unit)
                         });
                         let confirmed = model.session.confirmation();
                         let best = confirmed.map_or(best.clone(), |confirmed| format!("{best}; {confirmed}"));

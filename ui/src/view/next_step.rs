@@ -83,20 +83,15 @@ fn live(model: &Model) -> NextStep {
         }
         // What a stopped robot needs comes before the verdict.
         mode if stage == Some(ExperimentStage::Review) && !matches!(mode, Mode::Damped | Mode::Fault) => review(model),
-        mode @ (Mode::Damped | Mode::Fault) => {
+        Mode::Damped | Mode::Fault => {
             let cause = &session.stopped_because;
             // A verdict is possible unless another row of Trials is selected.
             let waiting = session.under_review().map(|trial| trial.trial);
             let review = waiting.is_some() && waiting_trial_is_meant(model).is_ok();
-            let fell = session.under_review().is_some_and(|trial| trial.suggested == Some(Verdict::Fall));
             // The cause of a fall stands beside its suggested verdict; STOP says itself why.
             let is_stop = *cause == TransitionCause::Stop.to_string();
-            let stopped = match mode {
-                Mode::Fault => "FAULT",
-                _ if fell && !is_stop => "FELL",
-                _ => "STOPPED",
-            };
-            let because = match cause.is_empty() || is_stop || mode == Mode::Damped && fell {
+            let stopped = stopped(model);
+            let because = match cause.is_empty() || is_stop || stopped == FELL && waiting.is_some() {
                 true => String::new(),
                 false => format!(": {cause}"),
             };
@@ -249,13 +244,27 @@ fn replay(model: &Model) -> NextStep {
     )
 }
 
+const FELL: &str = "FELL";
+
+/// The state of a robot that waits for an acknowledgement, in one word; the same before and after the verdict.
+fn stopped(model: &Model) -> &'static str {
+    let session = &model.session;
+    let fell = session.under_review().is_some_and(|trial| trial.suggested == Some(Verdict::Fall));
+    match model.mode() {
+        Mode::Fault => "FAULT",
+        _ if session.stopped_because == TransitionCause::Stop.to_string() => "STOPPED",
+        _ if fell || session.stopped_because.starts_with("fell: ") => FELL,
+        _ => "STOPPED",
+    }
+}
+
 /// The step of an open dialog. A stopped robot comes before what the dialog asks.
 fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let step = of_dialog(model, dialog);
     if !model.stop_requested() || legal(Action::Acknowledge, model).is_err() {
         return step;
     }
-    let stopped = if model.mode() == Mode::Fault { "FAULT" } else { "STOPPED" };
+    let stopped = stopped(model);
     let acknowledge = model.keymap.key(Action::Acknowledge);
     let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
     NextStep { lead: format!("{stopped}: {way}{acknowledge} acknowledges. {}", step.lead), ..step }
