@@ -303,6 +303,12 @@ fn a_finished_study_says_so_and_what_comes_next() {
         &screen,
         &["Study finished", "best 0.610 m (#2)", "C more", "K confirm", "E export", "The study is finished."],
     );
+    // Regression: the gains with which the best was reached stood in its note alone.
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let gain = line_with(&screen, "450.0");
+        assert!(gain.contains("kp") && gain.contains("was 400.0"), "{screen}");
+    }
     console.press(&["C"]);
     assert_eq!(console.requests(&["Enter"]), [OperatorRequest::Continue(20)]);
     console.press(&["K"]);

@@ -3,8 +3,8 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, QueuedPoint, SearchStatus,
-    SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
+    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, ProposedParameter, QueuedPoint,
+    SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -105,11 +105,22 @@ impl SessionModel {
         self.info.gains.iter().find(|gain| gain.name == name)
     }
 
+    /// Returns the gains of the best trial that differ from the configured ones.
+    pub fn changed_gains_of_best(&self) -> Vec<ProposedParameter> {
+        let Some((best, last)) = self.trials.best().zip(self.proposal.as_ref()) else { return Vec::new() };
+        let own =
+            |gain: &ProposedParameter| Some(ProposedParameter { value: best.gains.get(&gain.name)?, ..gain.clone() });
+        last.gains.iter().filter_map(own).filter(|gain| gain.value != gain.proposed).collect()
+    }
+
     /// Returns the rows of the panel of the trial: its heading, parameters and gains, what is expected, the repeats.
     pub fn trial_rows(&self) -> u16 {
         let parameters = self.info.parameters.len().max(3) as u16;
         let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
-        let gains = self.open_proposal().map_or(0, changed) as u16;
+        let gains = match self.stage_is(ExperimentStage::Finished) {
+            true => self.changed_gains_of_best().len(),
+            false => self.open_proposal().map_or(0, changed),
+        } as u16;
         // Repeats are shown while the best is being confirmed and when the study is finished.
         let confirming = self.confirming().is_some();
         let repeats = match confirming || self.stage_is(ExperimentStage::Finished) {

@@ -194,6 +194,7 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         let p = ProposedParameter { name: name.clone(), value: *value, proposed: *value };
         lines.push(parameter(session, theme, &p, width));
     }
+    lines.extend(session.changed_gains_of_best().iter().map(|gain| parameter(session, theme, gain, width)));
     let offers = [(Action::Continue, "more"), (Action::ConfirmBest, "confirm"), (Action::ExportBest, "export")];
     let offer = |(action, text)| {
         let (key, text) = (model.keymap.key(action), format!(" {text} "));
