@@ -38,9 +38,7 @@ pub(super) fn open_without_prior(
     let mut study = open_study(options, durability)?;
     let budget = options.budget();
     let worker = if options.join.is_some() { study.join()? } else { 0 };
-    if worker == 0 {
-        take_over(options, &mut study)?;
-    }
+    let other_sampler = if worker == 0 { take_over(options, &mut study)? } else { None };
     let backend = options.backend.name();
     if made_on(&StudyAttributes::of(study.attributes())) != backend {
         study.annotate_study(&attributes::write(&BackendAttribute { backend }))?;
@@ -63,14 +61,20 @@ pub(super) fn open_without_prior(
         envelope: options.config.hop_envelope(options.backend),
         needs_prior: options.config.optimize.sampler.kind == SamplerKind::Sim && options.prior.is_none(),
     };
-    Ok(Experiment::open(plan, study)?)
+    let mut experiment = Experiment::open(plan, study)?;
+    if let Some(before) = other_sampler {
+        let name = options.config.optimize.sampler.kind.name();
+        experiment.warn(format!("the sampler is {name} from now on; the study was continued with {before} before"));
+    }
+    Ok(experiment)
 }
 
-/// Keeps budget and sampler of the session that has the study's folder in the study.
+/// Keeps budget and sampler of the session that has the study's folder in the study. Returns the name of the sampler before, if it was
+/// another.
 ///
 /// # Errors
 /// When more trials count already than are asked for, or the study cannot be written.
-fn take_over(options: &Options, study: &mut Study) -> Result<(), EngineError> {
+fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, EngineError> {
     let budget = options.budget();
     if StudyAttributes::of(study.attributes()).budget != Some(budget) {
         let counted = experiment::counted(study);
@@ -79,11 +83,12 @@ fn take_over(options: &Options, study: &mut Study) -> Result<(), EngineError> {
         }
         study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
     }
+    let before = experiment::last_sampler(study);
     let sampler = attributes::write(&SamplerAttribute { sampler: &study.options().sampler });
     if sampler.iter().any(|(name, value)| study.attributes().get(name) != Some(value)) {
         study.annotate_study(&sampler)?;
     }
-    Ok(())
+    Ok(before.filter(|before| before != options.config.optimize.sampler.kind.name()))
 }
 
 /// Opens the study of `options`, created if it does not exist, with the prior of the options and the first point of the

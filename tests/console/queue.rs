@@ -199,8 +199,9 @@ fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     session.wait_for(&["Trial #1, overridden"]);
     assert!(session.quit().success());
     let study = study_of(folder.path());
-    let mut session = Session::start(folder.path(), (120, 40), &["--resume", study.to_str().unwrap()]);
-    session.wait_for(&["Trial #1, overridden"]);
+    let arguments = ["--resume", study.to_str().unwrap(), "--sampler", "sobol"];
+    let mut session = Session::start(folder.path(), (120, 40), &arguments);
+    session.wait_for(&["Trial #1, overridden", "the sampler is sobol from now on"]);
     session.send("6");
     session.wait_for(&["kept from before: trial 1 will run with f0 1.2 Hz"]);
     // A re-run takes the number.

@@ -325,6 +325,9 @@ fn a_study_names_its_last_sampler_and_which_trials_each_has_proposed() {
     let study = program.study("recordings");
     let study = study.to_str().unwrap();
     assert!(!program.text(&["study", "show", study]).contains("proposed:"));
+    // A session that proposes nothing: the trials keep their sampler.
+    program.text(&["optimize", "--resume", study, "--trials", "2", "--sampler", "gp", "--record", "none"]);
+    assert_shows(&program.text(&["study", "show", study]), &["proposed: 2 by random (from trial 0)", "kind gp"]);
     program.text(&["optimize", "--resume", study, "--trials", "5", "--sampler", "sobol", "--record", "none"]);
     let shown = program.text(&["study", "show", study]);
     assert_shows(&shown, &["proposed: 2 by random (from trial 0), 3 by sobol (from trial 2)", "kind sobol"]);

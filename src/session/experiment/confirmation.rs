@@ -111,13 +111,12 @@ impl BestConfirmation {
             }
             Confirmation::Repeat(_) => {
                 let rank = rank(&compared, direction);
-                let message = format!(
-                    "the {} repeats are used up: {}, short of {:.0} %",
-                    running.repeats,
-                    lead_text(&compared[rank.leader], rank.confidence),
-                    100.0 * self.confidence
-                );
-                over(rank.leader, rank.confidence, message)
+                let (confidence, short) = match repeated(&compared) {
+                    true => (rank.confidence, format!("short of {:.0} %", 100.0 * self.confidence)),
+                    false => (NO_CONFIDENCE, format!("each point needs {LEAST_REPEATS} jumps to be compared")),
+                };
+                let lead = lead_text(&compared[rank.leader], confidence);
+                over(rank.leader, confidence, format!("the repeats are used up: {lead}; {short}"))
             }
         }
     }
@@ -141,12 +140,12 @@ impl BestConfirmation {
             (None, None) => &[],
         };
         let leader = match (&concluded, &running) {
-            (Some(concluded), _) => Some((concluded.leader, concluded.confidence)),
+            (Some(concluded), _) => {
+                Some((concluded.leader, concluded.confidence)).filter(|(_, confidence)| *confidence > NO_CONFIDENCE)
+            }
             (None, Some(running)) => {
                 let compared = compared(&running.trials, study);
-                // Before every point has been repeated the spread is not known.
-                let repeated = compared.len() > 1 && compared.iter().all(|point| point.repeats() >= LEAST_REPEATS);
-                repeated
+                (compared.len() > 1 && repeated(&compared))
                     .then(|| rank(&compared, study.options().direction))
                     .map(|rank| (compared[rank.leader].trials[0], rank.confidence))
             }
@@ -222,12 +221,23 @@ fn compared(first_trials: &[u32], study: &Study) -> Vec<RepeatedPoint> {
     first_trials.iter().filter_map(|first| points.iter().find(|point| point.trials.contains(first)).cloned()).collect()
 }
 
+/// Confidence of a comparison that had too few jumps.
+const NO_CONFIDENCE: f64 = 0.0;
+
+/// Whether every point has been repeated: before, the spread is not known, and equal results would pass for certainty.
+fn repeated(compared: &[RepeatedPoint]) -> bool {
+    compared.iter().all(|point| point.repeats() >= LEAST_REPEATS)
+}
+
 fn lead_text(point: &RepeatedPoint, confidence: f64) -> String {
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
+    let sure = match confidence > NO_CONFIDENCE {
+        true => format!("with {:.1} % confidence", 100.0 * confidence),
+        false => "without a confidence".to_owned(),
+    };
     format!(
-        "the point of trial {} leads with {:.1} % confidence: mean {:.3}{spread}, stood {} of {}",
+        "the point of trial {} leads {sure}: mean {:.3}{spread}, stood {} of {}",
         point.trials[0],
-        100.0 * confidence,
         point.mean(),
         point.without_fall,
         point.repeats()

@@ -375,8 +375,17 @@ impl Experiment {
         self.outbox.extend(self.rows.get(&trial).cloned().map(Record::Trial));
     }
 
+    /// Says something that the operator is to see.
+    pub(crate) fn warn(&mut self, message: String) {
+        self.log_at(LogLevel::Warning, message);
+    }
+
     fn log(&mut self, message: String) {
-        self.outbox.push(Record::Log(LogRecord { level: LogLevel::Info, source: "study".to_owned(), message }));
+        self.log_at(LogLevel::Info, message);
+    }
+
+    fn log_at(&mut self, level: LogLevel, message: String) {
+        self.outbox.push(Record::Log(LogRecord { level, source: "study".to_owned(), message }));
     }
 
     fn log_all(&mut self, messages: Vec<String>) {
@@ -397,8 +406,13 @@ pub fn counted(study: &Study) -> u32 {
     study.trials().iter().filter(counts).count() as u32
 }
 
+/// Returns the name of the sampler with which a stored study was made or continued last.
+pub fn last_sampler(study: &Study) -> Option<String> {
+    Some(study.attributes().get("sampler")?.get("kind")?.as_str()?.to_owned())
+}
+
 /// Returns how many trials each sampler has proposed and from which trial on, `12 by tpe (from trial 0), 8 by gp (from trial 12)`; none
-/// where one sampler has proposed all.
+/// where the last sampler has proposed all.
 pub fn samplers_in_words(study: &Study) -> Option<String> {
     let mut samplers: Vec<(String, u32, u32)> = Vec::new();
     for trial in study.trials() {
@@ -409,7 +423,9 @@ pub fn samplers_in_words(study: &Study) -> Option<String> {
         }
     }
     let words = samplers.iter().map(|(name, count, first)| format!("{count} by {name} (from trial {first})"));
-    (samplers.len() > 1).then(|| words.collect::<Vec<_>>().join(", "))
+    let last = last_sampler(study);
+    let others = samplers.iter().any(|(name, ..)| last.as_ref() != Some(name));
+    others.then(|| words.collect::<Vec<_>>().join(", "))
 }
 
 /// Returns the trial table of a stored study: every trial but those that wait.

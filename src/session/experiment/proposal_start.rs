@@ -12,7 +12,7 @@ use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
 use crate::optimize::study::{Study, StudyError, TellOutcome};
 use crate::optimize::trial::Trial;
-use crate::recording::record::{LogLevel, LogRecord, Record};
+use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
     JumpParameters, ParameterInfo, ParameterValues, ProposalInsight, ProposalSource, ProposedParameter, SearchStatus,
@@ -70,7 +70,7 @@ impl Experiment {
         let number = open.number();
         if open.lacks_prior() {
             let message = format!("trial {number} is proposed as by gp: the model of sim cannot be fitted");
-            self.outbox.push(Record::Log(LogRecord { level: LogLevel::Warning, source: "study".to_owned(), message }));
+            self.warn(message);
         }
         self.outbox.push(Record::Insight(open.insight(&model)));
         self.outbox.push(Record::Proposal(open.proposal()));
@@ -114,7 +114,7 @@ impl Experiment {
         let message = format!(
             "trial {trial} waits for its verdict since the last session: it was measured, its jump is in that session's recording"
         );
-        self.outbox.push(Record::Log(LogRecord { level: LogLevel::Warning, source: "study".to_owned(), message }));
+        self.warn(message);
         Ok(())
     }
 
