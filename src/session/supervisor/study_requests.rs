@@ -7,10 +7,7 @@ use crate::trial::{Proposal, Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
-    let (undoable, changed) = (experiment.undoable(), experiment.changed_proposal());
-    use OperatorRequest::{ChangeVerdict, Fix, NarrowBounds, Unfix};
-    let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
-    let drawn = experiment.proposal().filter(|_| searches);
+    let before = Before::of(experiment);
     let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
     let again = format!("{trial} is void, and its parameters are proposed again");
     let output = match request {
@@ -25,18 +22,8 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
         OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
         _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
     };
-    let mut more = side_effects(experiment, request, undoable, changed);
-    let values = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.proposed).collect::<Vec<_>>();
-    if let (Some(before), Some(now)) = (drawn, experiment.proposal())
-        && before.trial == now.trial
-        && values(&before) != values(&now)
-    {
-        more += &format!("; proposal {} is drawn again", now.trial);
-    }
-    if let Some(conclusion) = experiment.take_conclusion() {
-        more += &format!("; {conclusion}");
-    }
-    let say = |answer: String| answer + &more;
+    let effects = side_effects(experiment, request, &before);
+    let say = |answer: String| answer + &effects;
     match output {
         JobOutput::Answer(answer) => JobOutput::Answer(answer.map(say)),
         JobOutput::Judged(answer, over) => JobOutput::Judged(answer.map(say), over),
@@ -44,27 +31,54 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
     }
 }
 
-/// Returns what a request has done beside what it was asked for: made the verdict of the trial `undoable` final, or kept or
-/// dropped the values that the operator had changed in the proposal `changed`.
-fn side_effects(
-    experiment: &Experiment,
-    request: &OperatorRequest,
+/// State that a request may change beside what it is asked for.
+struct Before {
+    /// The trial whose verdict can be taken back.
     undoable: Option<u32>,
+    /// The proposal whose values the operator has changed.
     changed: Option<u32>,
-) -> String {
-    use OperatorRequest::{ClearOverrides, Judge, Override, OverrideGain, Skip, Undo};
+    proposal: Option<Proposal>,
+}
+
+impl Before {
+    fn of(experiment: &Experiment) -> Before {
+        Before {
+            undoable: experiment.undoable(),
+            changed: experiment.changed_proposal(),
+            proposal: experiment.proposal(),
+        }
+    }
+}
+
+/// Returns in words what a request has done beside what it was asked for: made a verdict final, kept or dropped changed values,
+/// drawn the proposal again, ended the confirmation of the best. Empty if nothing.
+fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: &Before) -> String {
+    use OperatorRequest::{
+        ChangeVerdict, ClearOverrides, Fix, Judge, NarrowBounds, Override, OverrideGain, Skip, Undo, Unfix,
+    };
     let mut text = String::new();
-    if let Some(trial) = undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
+    if let Some(trial) = before.undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
         text += &format!("; the verdict of trial {trial} is final now");
     }
-    let Some(trial) = changed else { return text };
-    match request {
-        ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. } => {}
-        _ if experiment.changed_proposal().is_none() => {
-            text += &format!("; the changed values of proposal {trial} are dropped: change them again");
+    if let Some(trial) = before.changed {
+        match request {
+            ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. } => {}
+            _ if experiment.changed_proposal().is_none() => {
+                text += &format!("; the changed values of proposal {trial} are dropped: change them again");
+            }
+            Undo | Judge(_) => text += &format!("; proposal {trial} keeps its changed values"),
+            _ => {}
         }
-        Undo | Judge(_) => text += &format!("; proposal {trial} keeps its changed values"),
-        _ => {}
+    }
+    let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
+    if let (true, Some(before), Some(now)) = (searches, &before.proposal, experiment.proposal()) {
+        let drawn = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.proposed).collect::<Vec<_>>();
+        if before.trial == now.trial && drawn(before) != drawn(&now) {
+            text += &format!("; proposal {} is drawn again", now.trial);
+        }
+    }
+    if let Some(conclusion) = experiment.take_conclusion() {
+        text += &format!("; {conclusion}");
     }
     text
 }
