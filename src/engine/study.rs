@@ -77,7 +77,7 @@ pub(super) fn open_without_prior(
 fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, EngineError> {
     let budget = options.budget();
     if StudyAttributes::of(study.attributes()).budget != Some(budget) {
-        let counted = experiment::counted(study);
+        let counted = experiment::rows_of(study, &[]).iter().filter(|row| row.counts()).count() as u32;
         if counted > budget {
             return Err(EngineError::BudgetBelowCounted { budget, counted });
         }

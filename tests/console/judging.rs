@@ -568,7 +568,7 @@ fn a_fall_is_no_stop_and_a_waiting_trial_is_named_while_another_row_is_selected(
     assert_shows(&console.next_step(), &["Trial 1 waits for its verdict"]);
 }
 
-/// Regression: after the verdict on a detected fall the robot was STOPPED, which nobody had done.
+/// Regression: after the verdict on a detected fall the robot was called STOPPED, as after the STOP of an operator.
 #[test]
 fn a_robot_that_fell_is_not_called_stopped_after_the_verdict() {
     let mut console = Console::review(Mode::Jump, Verdict::Fall);

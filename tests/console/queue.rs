@@ -17,6 +17,14 @@ fn text(output: &Output) -> String {
 }
 
 /// A session with an armed robot and three queued points, and the folder of its study.
+/// Arms the robot and lets it jump; the trial waits for its verdict then.
+fn jump(session: &mut Session) {
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["judge it"]);
+}
+
 /// The study of the only session in `folder`.
 fn study_of(folder: &Path) -> PathBuf {
     let mut entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("an entry").path());
@@ -127,10 +135,7 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     session.send("k");
     session.wait_for(&["Press A to arm"]);
     // Nothing is changed while a trial runs.
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["judge it"]);
+    jump(&mut session);
     session.send("N");
     session.wait_for(&["#2    queued          f0 1.3"]);
     session.send("xy");
@@ -167,10 +172,7 @@ fn a_point_that_is_queued_twice_is_said_to_be() {
 #[test]
 fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
     let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["judge it"]);
+    jump(&mut session);
     session.send("r");
     session.wait_for(&["Trial #1, re-run of #0"]);
     session.send("Q");
@@ -183,10 +185,7 @@ fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
 #[test]
 fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     let (folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["judge it"]);
+    jump(&mut session);
     session.send("a");
     session.wait_for(&["Trial #1, by the sampler"]);
     session.send("o");
@@ -205,10 +204,8 @@ fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     session.send("6");
     session.wait_for(&["kept from before: trial 1 will run with f0 1.2 Hz"]);
     // A re-run takes the number.
-    session.send("1A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["judge it"]);
+    session.send("1");
+    jump(&mut session);
     session.send("a");
     session.wait_for(&["Trial #2, by the sampler"]);
     session.send("o");

@@ -309,6 +309,17 @@ fn a_finished_study_says_so_and_what_comes_next() {
         let gain = line_with(&screen, "450.0");
         assert!(gain.contains("kp") && gain.contains("was 400.0"), "{screen}");
     }
+    // One that the study searches stands among the parameters, once.
+    let best = TrialRecord {
+        value: Some(0.61),
+        parameters: vec![("kp".into(), 450.0)].into(),
+        gains: vec![("kp".into(), 450.0)].into(),
+        ..trial(2, Some(Verdict::Accept), None)
+    };
+    console.record(Record::Trial(best));
+    let screen = console.screen(120, 40);
+    assert!(screen.matches("450.0").count() == 1 && !screen.contains("was 400.0"), "{screen}");
+    console = finished();
     console.press(&["C"]);
     assert_eq!(console.requests(&["Enter"]), [OperatorRequest::Continue(20)]);
     console.press(&["K"]);

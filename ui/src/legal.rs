@@ -119,9 +119,9 @@ fn require(condition: bool, reason: &str) -> Legality {
     if condition { Ok(()) } else { Err(reason.to_owned()) }
 }
 
-/// A text field would take the Space that is to stop a jump.
+/// A text field would take the Space that is to stop a jump. In a countdown any key cancels.
 fn must_not_jump(model: &Model) -> Legality {
-    let jumps = matches!(model.mode(), Mode::Countdown | Mode::Jump) && model.replay.is_none();
+    let jumps = model.mode() == Mode::Jump && model.replay.is_none();
     require(!jumps, "the robot is jumping, and Space would type; write after the jump")
 }
 

@@ -3,7 +3,7 @@
 
 use serde::Deserialize;
 
-use super::attributes::{CHANGED_PREFIX, Changes, KeptChanges};
+use super::changes::{CHANGED_PREFIX, Changes, KeptChanges};
 use super::open_proposal::OpenProposal;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};

@@ -7,6 +7,7 @@
 
 pub(crate) mod attributes;
 mod between_repeats;
+mod changes;
 mod confirmation;
 mod envelope;
 mod judging;
@@ -22,7 +23,7 @@ mod search;
 mod trial_changes;
 mod verdict_change;
 
-pub use self::attributes::CHANGED_PREFIX;
+pub use self::changes::CHANGED_PREFIX;
 pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;
@@ -398,12 +399,6 @@ impl Experiment {
 /// Whether a trial was measured and waits for the verdict of a person.
 pub fn waits_for_verdict(trial: &Trial) -> bool {
     trial.state == TrialState::Running && TrialAttributes::of(trial).is_unjudged()
-}
-
-/// Returns the number of trials of a stored study that count for its budget.
-pub fn counted(study: &Study) -> u32 {
-    let counts = |trial: &&Trial| trial.state == TrialState::Complete && !attributes::confirms(trial);
-    study.trials().iter().filter(counts).count() as u32
 }
 
 /// Returns the name of the sampler with which a stored study was made or continued last.

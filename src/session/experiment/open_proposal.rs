@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::attributes::{Changes, Origin};
+use super::attributes::Origin;
+use super::changes::Changes;
 use super::plan::{RequestRefusal, must_be};
 use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;

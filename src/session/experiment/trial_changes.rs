@@ -1,7 +1,8 @@
 //! Changes of the proposal, the search and the queue by the operator. Each request is checked; a refusal names the limit.
 //! Nothing runs before it is approved.
 
-use super::attributes::{self, BudgetAttribute, Changes, Origin};
+use super::attributes::{self, BudgetAttribute, Origin};
+use super::changes::Changes;
 use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
 use super::{Experiment, ExperimentState, confirmation, envelope};

@@ -3,11 +3,11 @@
 use crate::session::experiment::{Experiment, RequestRefusal};
 use crate::session::operator_request::{OperatorRequest, counted};
 use crate::session::storage::JobOutput;
-use crate::trial::{Proposal, Verdict, six_digits};
+use crate::trial::{Verdict, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
-    let before = Before::of(experiment);
+    let before = Before::of(experiment, request);
     let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
     let again = format!("{trial} is void, and its parameters are proposed again");
     let output = match request {
@@ -37,25 +37,23 @@ struct Before {
     undoable: Option<u32>,
     /// The proposal whose values the operator has changed.
     changed: Option<u32>,
-    proposal: Option<Proposal>,
+    /// Number and proposed values of the open proposal, for a request that may draw it again.
+    drawn: Option<(u32, Vec<f64>)>,
 }
 
 impl Before {
-    fn of(experiment: &Experiment) -> Before {
-        Before {
-            undoable: experiment.undoable(),
-            changed: experiment.changed_proposal(),
-            proposal: experiment.proposal(),
-        }
+    fn of(experiment: &Experiment, request: &OperatorRequest) -> Before {
+        use OperatorRequest::{ChangeVerdict, Fix, NarrowBounds, Unfix};
+        let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
+        let drawn = if searches { drawn(experiment) } else { None };
+        Before { undoable: experiment.undoable(), changed: experiment.changed_proposal(), drawn }
     }
 }
 
 /// Returns in words what a request has done beside what it was asked for: made a verdict final, kept or dropped changed values,
 /// drawn the proposal again, ended the confirmation of the best. Empty if nothing.
 fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: &Before) -> String {
-    use OperatorRequest::{
-        ChangeVerdict, ClearOverrides, Fix, Judge, NarrowBounds, Override, OverrideGain, Skip, Undo, Unfix,
-    };
+    use OperatorRequest::{ClearOverrides, Judge, Override, OverrideGain, Skip, Undo};
     let mut text = String::new();
     if let Some(trial) = before.undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
         text += &format!("; the verdict of trial {trial} is final now");
@@ -70,17 +68,21 @@ fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: 
             _ => {}
         }
     }
-    let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
-    if let (true, Some(before), Some(now)) = (searches, &before.proposal, experiment.proposal()) {
-        let drawn = |proposal: &Proposal| proposal.parameters.iter().map(|p| p.proposed).collect::<Vec<_>>();
-        if before.trial == now.trial && drawn(before) != drawn(&now) {
-            text += &format!("; proposal {} is drawn again", now.trial);
-        }
+    if let Some((trial, values)) = &before.drawn
+        && drawn(experiment).is_some_and(|(now, new)| now == *trial && new != *values)
+    {
+        text += &format!("; proposal {trial} is drawn again");
     }
     if let Some(conclusion) = experiment.take_conclusion() {
         text += &format!("; {conclusion}");
     }
     text
+}
+
+/// Returns number and proposed values of the open proposal.
+fn drawn(experiment: &Experiment) -> Option<(u32, Vec<f64>)> {
+    let proposal = experiment.proposal()?;
+    Some((proposal.trial, proposal.parameters.iter().map(|p| p.proposed).collect()))
 }
 
 /// The answer to a verdict. If another program has ended the trial, the review is over as well.

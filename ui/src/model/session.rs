@@ -105,12 +105,14 @@ impl SessionModel {
         self.info.gains.iter().find(|gain| gain.name == name)
     }
 
-    /// Returns the gains of the best trial that differ from the configured ones.
+    /// Returns the gains of the best trial that differ from the configured ones. Those that the study searches are parameters.
     pub fn changed_gains_of_best(&self) -> Vec<ProposedParameter> {
         let Some((best, last)) = self.trials.best().zip(self.proposal.as_ref()) else { return Vec::new() };
         let own =
             |gain: &ProposedParameter| Some(ProposedParameter { value: best.gains.get(&gain.name)?, ..gain.clone() });
-        last.gains.iter().filter_map(own).filter(|gain| gain.value != gain.proposed).collect()
+        let searched = |gain: &ProposedParameter| best.parameters.get(&gain.name).is_some();
+        let gains = last.gains.iter().filter_map(own);
+        gains.filter(|gain| gain.value != gain.proposed && !searched(gain)).collect()
     }
 
     /// Returns the rows of the panel of the trial: its heading, parameters and gains, what is expected, the repeats.
