@@ -91,12 +91,31 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     assert_eq!(console.requests(&["=", "0", ",", "3", "Enter"]), [OperatorRequest::HandValue(Some(0.3))]);
     // With nothing typed there is nothing to confirm.
-    assert_eq!(console.requests(&["=", "x", "Enter"]), []);
-    assert_shows(&console.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
+    let mut without_value = finished();
+    assert_eq!(without_value.requests(&["C", "Backspace", "x", "Enter"]), []);
+    assert_shows(&without_value.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
     // The form of the overrides refuses a letter aloud, too.
     let mut console = Console::ready();
     assert_eq!(console.requests(&["o", "x"]), []);
     assert_shows(&console.screen(80, 24), &["`x` does not belong here: a number is typed"]);
+}
+
+/// Regression: the hint promises that an empty field goes back to the measured value, and Enter said that nothing was typed.
+#[test]
+fn an_empty_field_of_a_value_by_hand_goes_back_to_the_measured_one() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    let measured = [OperatorRequest::HandValue(None)];
+    assert_eq!(console.requests(&["="]), []);
+    assert_shows(&console.screen(80, 24), &["0.420 m; empty: back"]);
+    assert_eq!(console.requests(&["Enter"]), measured);
+    // A character that was not taken is reported once, with the effect of Enter.
+    assert_eq!(console.requests(&["=", "x", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again goes back to the measured value"]);
+    assert_eq!(console.requests(&["Enter"]), measured);
+    // A key that empties the field acknowledges it.
+    console.press(&["=", "x", "3", "Backspace"]);
+    assert_shows(&console.screen(80, 24), &["0.420 m; empty: back"]);
+    assert_eq!(console.requests(&["Enter"]), measured);
 }
 
 #[test]

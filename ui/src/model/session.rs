@@ -202,4 +202,9 @@ impl SessionModel {
         let of_one_jump = || Some(objective::value(&ObjectiveRule::single(self.info.task?), measured));
         measured.measured_value.or_else(of_one_jump)
     }
+
+    /// The measured objective of the trial with that number, before any verdict.
+    pub fn measured_objective_of(&self, trial: u32) -> Option<f64> {
+        self.measured_objective(self.trials.records.get(&trial)?)
+    }
 }

@@ -290,8 +290,7 @@ fn by_hand(model: &Model, trial: u32) -> String {
         Some(Task::TwistCw) => "turn clockwise, start to rest",
         None => "J",
     };
-    let measured = model.session.trials.records.get(&trial).and_then(|row| model.session.measured_objective(row));
-    match measured {
+    match model.session.measured_objective_of(trial) {
         Some(value) => format!("{along}; the robot measured {} {}; empty: back to that", number(value), info.unit),
         None => format!("{along}; the robot measured nothing"),
     }

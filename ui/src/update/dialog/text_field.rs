@@ -38,16 +38,19 @@ pub(super) fn key(
     if replaces && takes && refused.is_none() {
         input.reset();
         if key.typed().is_none() {
-            model.dialog = Some(Dialog::Field { purpose, input, replaces: false, problem });
+            model.dialog = Some(Dialog::Field { purpose, input, replaces: false, problem: None });
             return Vec::new();
         }
     }
     match key.code() {
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
         KeyCode::Enter if problem.is_some() => {
-            problem = Some(match input.value() {
-                "" => "nothing was typed yet; Esc cancels".to_owned(),
-                number => format!("a character was not taken; Enter again confirms {number}"),
+            problem = Some(match (input.value(), purpose) {
+                ("", Purpose::HandValue(trial)) if model.session.measured_objective_of(trial).is_some() => {
+                    "a character was not taken; Enter again goes back to the measured value".to_owned()
+                }
+                ("", _) => "nothing was typed yet; Esc cancels".to_owned(),
+                (number, _) => format!("a character was not taken; Enter again confirms {number}"),
             });
         }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
@@ -60,7 +63,11 @@ pub(super) fn key(
         }
         _ => match refused {
             Some(c) => problem = Some(format!("`{c}`{not_of_it}")),
-            None => edit(&mut input, key),
+            None => {
+                edit(&mut input, key);
+                // An emptied field has no number that the missing character could have changed.
+                problem = problem.filter(|_| !input.value().is_empty());
+            }
         },
     }
     let replaces = replaces && refused.is_some();
