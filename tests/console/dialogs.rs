@@ -326,3 +326,23 @@ fn the_list_of_series_is_as_wide_as_its_texts() {
     assert_shows(&screen, &["Series of the charts"]);
     assert!(!words_of_the_dialog(&screen).contains(".."), "{screen}");
 }
+
+/// Regression: a key without a meaning in the queue or in the form of the overrides had no answer.
+#[test]
+fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
+    let mut console = Console::ready();
+    console.press(&["N", "z"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Enter does"]);
+    let point = QueuedPoint { trial: 3, source: ProposalSource::Operator, ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
+    assert_eq!(console.press(&["z"]), []);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down Left Right x Enter do"]);
+    console.press(&["Esc", "o", "Home"]);
+    let keys = "a number, arrows, PgUp PgDn, Enter, Q and Esc do";
+    assert_shows(&console.screen(80, 24), &[&format!("Home does nothing here; {keys}")]);
+    console.press(&["1", "F5"]);
+    assert_shows(&console.screen(80, 24), &["F5 does nothing here; a number, Left Right, Backspace, Enter and Esc do"]);
+    // The typed number stays.
+    console.press(&["2", "Esc", "Esc"]);
+    assert_eq!(console.said(), "cancelled: nothing was changed");
+}

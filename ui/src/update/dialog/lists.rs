@@ -1,6 +1,7 @@
 //! Keys of the lists: palette, help, switches, details of a trial.
 
 use crossterm::event::KeyCode;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use strum::VariantArray;
 use tui_input::Input;
@@ -14,7 +15,7 @@ use crate::model::dialog::{Choice, Dialog, Question};
 use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
-use crate::update::request::{cancelled, refused, request};
+use crate::update::request::{cancelled, refused, request, say};
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -126,8 +127,8 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
     let trial = queue.get(selected).map(|point| point.trial);
     // A moved point changes places with its neighbour, whose number it has then.
     let (selected, change) = match (key.code(), trial) {
-        (KeyCode::Up, _) => (selected.saturating_sub(1), None),
-        (KeyCode::Down, _) => ((selected + 1).min(last), None),
+        (KeyCode::Up, Some(_)) => (selected.saturating_sub(1), None),
+        (KeyCode::Down, Some(_)) => ((selected + 1).min(last), None),
         (KeyCode::Left, Some(trial)) => {
             (selected.saturating_sub(1), Some(OperatorRequest::MoveQueued { trial, earlier: true }))
         }
@@ -143,7 +144,15 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
             return Vec::new();
         }
         (KeyCode::Esc | KeyCode::Enter, _) => return Vec::new(),
-        _ => (selected, None),
+        _ => {
+            let keys = match may_request(model) {
+                _ if trial.is_none() => "Enter does",
+                Ok(()) => "Up Down Left Right x Enter do",
+                Err(_) => "Up Down Enter do",
+            };
+            say(model, LogLevel::Info, format!("{key} does nothing here; {keys}"));
+            (selected, None)
+        }
     };
     model.dialog = Some(Dialog::Queue { selected });
     change.map_or_else(Vec::new, |change| request(model, change))

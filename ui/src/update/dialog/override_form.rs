@@ -47,6 +47,17 @@ impl OverrideForm {
         self.problem.is_none()
     }
 
+    /// The keys that work, for the answer to another one.
+    fn keys(&self, model: &Model) -> String {
+        match self.typing {
+            Some(_) => "a number, Left Right, Backspace, Enter and Esc do".to_owned(),
+            None => {
+                let queue = model.keymap.key(Action::QueuePoint);
+                format!("a number, arrows, PgUp PgDn, Enter, {queue} and Esc do")
+            }
+        }
+    }
+
     fn select(&mut self, selected: usize) {
         if self.take_typed() {
             self.selected = selected.min(self.rows.len().saturating_sub(1));
@@ -88,12 +99,12 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
         _ => {
             // Only the characters of a number can be typed here.
             let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
-            if digit || form.typing.is_some() && key.typed().is_none() {
-                form.problem = None;
-                edit(form.typing.get_or_insert_default(), key);
-            } else if let Some(c) = key.typed() {
-                form.problem = Some(format!("`{c}`{NOT_OF_A_NUMBER}"));
-            }
+            let edits = digit || form.typing.is_some() && key.typed().is_none();
+            form.problem = match key.typed() {
+                _ if edits && edit(form.typing.get_or_insert_default(), key) => None,
+                Some(c) => Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
+                None => Some(format!("{key} does nothing here; {}", form.keys(model))),
+            };
         }
     }
     model.override_row = form.selected;

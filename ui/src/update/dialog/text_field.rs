@@ -212,7 +212,8 @@ fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest
     }
 }
 
-pub(super) fn edit(input: &mut Input, key: Key) {
+/// Edits the text with a key; false for a key that does not edit.
+pub(super) fn edit(input: &mut Input, key: Key) -> bool {
     let request = match (key.typed(), key.code()) {
         (Some(c), _) => InputRequest::InsertChar(c),
         (None, KeyCode::Backspace) => InputRequest::DeletePrevChar,
@@ -223,7 +224,8 @@ pub(super) fn edit(input: &mut Input, key: Key) {
         (None, KeyCode::End) => InputRequest::GoToEnd,
         (None, KeyCode::Char('u')) => InputRequest::DeleteLine,
         (None, KeyCode::Char('w')) => InputRequest::DeletePrevWord,
-        _ => return,
+        _ => return false,
     };
     input.handle(request);
+    true
 }
