@@ -58,8 +58,8 @@ fn no_dialog_covers_the_frame_the_answer_or_the_next_step() {
         for (columns, rows) in SIZES {
             let mut console = Console::ready();
             console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
-            console.answer("override Fx = 120", true, "done");
             console.press(&[opening]);
+            console.answer("override Fx = 120", true, "done");
             assert!(console.model.dialog.is_some(), "{opening}");
             let screen = console.screen(columns, rows);
             let lines: Vec<&str> = screen.lines().collect();
@@ -86,8 +86,13 @@ fn a_compact_terminal_shows_the_trial_the_answer_and_the_next_step_whole() {
         let mut console = Console::ready();
         console.model.size = (columns, rows);
         let long = "a long answer, of which no word may be missing: ".repeat(2) + "the end";
-        console.model.message =
-            Some(Notice { level: LogLevel::Warning, text: long.clone(), stop: false, at: console.model.clock });
+        console.model.message = Some(Notice {
+            level: LogLevel::Warning,
+            text: long.clone(),
+            stop: false,
+            answer: false,
+            at: console.model.clock,
+        });
         let screen = console.screen(columns, rows);
         assert_shows(
             &screen,

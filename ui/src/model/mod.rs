@@ -82,6 +82,8 @@ pub struct Notice {
     pub text: String,
     /// Whether it answers the STOP key.
     pub stop: bool,
+    /// Whether it answers a request or a key: it says nothing that still holds later.
+    pub answer: bool,
     /// When it was shown, on the console's clock.
     pub at: Duration,
 }
@@ -257,10 +259,10 @@ impl Model {
         }
     }
 
-    /// The answer or warning to show: an old answer from before the open dialog is none to what that asks.
+    /// The answer or warning to show: an answer from before the open dialog is none to what that asks.
     pub fn shown_message(&self) -> Option<&Notice> {
         let before = |message: &Notice| self.dialog.is_some() && message.at < self.dialog_opened_at;
-        let stale = |message: &Notice| message.level == LogLevel::Info && message.is_old(self.clock) && before(message);
+        let stale = |message: &Notice| (message.level == LogLevel::Info || message.answer) && before(message);
         self.message.as_ref().filter(|message| !stale(message))
     }
 

@@ -12,7 +12,7 @@ use strum::VariantArray;
 use super::beside;
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, no_ghost, zoom};
 use super::rejudged;
-use super::request::{interrupt, request, say, stop};
+use super::request::{interrupt, reply, request, say, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_request};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
@@ -40,7 +40,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             return Vec::new();
         }
         let key = model.keymap.key(action);
-        say(model, LogLevel::Warning, format!("{key} is not possible: {reason}"));
+        reply(model, LogLevel::Warning, format!("{key} is not possible: {reason}"));
         // All failed arming checks are shown at once.
         let shown = action == Action::Arm && model.mode() == Mode::Disarmed && model.session.failing_checks() > 0;
         if shown && may_request(model).is_ok() {

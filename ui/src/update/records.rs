@@ -7,7 +7,7 @@ use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, 
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 
-use super::request::{cancelled, say};
+use super::request::{cancelled, reply, say};
 use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;
@@ -243,7 +243,7 @@ fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
         "" => command.request.clone(),
         answer => format!("{}: {outcome}{answer}", command.request),
     };
-    say(model, level, text.clone());
+    reply(model, level, text.clone());
     log(model, time_ns, level, "operator", text, false);
 }
 

@@ -31,12 +31,18 @@ pub(super) fn expire_interrupt(model: &mut Model) {
 
 /// Shows a line to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
-    model.message = Some(Notice { level, text: text.into(), stop: false, at: model.clock });
+    model.message = Some(Notice { level, text: text.into(), stop: false, answer: false, at: model.clock });
+}
+
+/// Answers a request or a key of the operator.
+pub(super) fn reply(model: &mut Model, level: LogLevel, text: impl Into<String>) {
+    model.message = Some(Notice { level, text: text.into(), stop: false, answer: true, at: model.clock });
 }
 
 /// Answers the STOP key.
 fn say_stop(model: &mut Model, text: &str) {
-    model.message = Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true, at: model.clock });
+    model.message =
+        Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true, answer: false, at: model.clock });
 }
 
 /// Reports that a dialog ended without effect.
@@ -47,7 +53,7 @@ pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
 
 /// Reports why something was not done.
 pub(super) fn refused(model: &mut Model, subject: &str, reason: &str) -> Vec<Effect> {
-    say(model, LogLevel::Warning, format!("{subject}: {reason}"));
+    reply(model, LogLevel::Warning, format!("{subject}: {reason}"));
     Vec::new()
 }
 
