@@ -168,6 +168,12 @@ impl ProposalSource {
     pub fn name(self) -> &'static str {
         self.into()
     }
+
+    /// Returns the name with the number of the trial that is repeated, if there is one: `re-run of #3`.
+    pub fn with_parent(self, parent: Option<u32>) -> String {
+        let parent = parent.map_or(String::new(), |parent| format!(" of #{parent}"));
+        format!("{}{parent}", self.name())
+    }
 }
 
 /// A proposed trial: the values that run if it is approved.

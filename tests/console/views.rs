@@ -397,7 +397,7 @@ fn details_show_all_values_of_a_trial() {
     let screen = console.screen(80, 24);
     assert_shows(
         &screen,
-        &["Trial #1", "of trial 0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s", "from 0 to 150 N)"],
+        &["Trial #1", "of #0", "by hand", "0.3700 m", "at 01:01 of the session, took 3.5 s", "from 0 to 150 N)"],
     );
     assert!(line_with(&screen, "attempt").contains('2'), "{screen}");
 }

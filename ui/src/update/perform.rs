@@ -72,7 +72,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::QueuePoint => {
             let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
             let (trial, point) = (proposal.trial, queued_values(proposal));
-            // The sampler's proposal stays and is from the queue then; a point of the queue would run twice.
+            // The sampler's proposal stays and is queued then; a queued point would run twice.
             match model.session.queue().iter().any(|queued| queued.trial == trial) {
                 true => open(model, Dialog::Confirm(Question::QueueProposed { trial })),
                 false => return request(model, OperatorRequest::Enqueue(point)),

@@ -31,8 +31,7 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     if let Some(value) = session.measured_objective(trial) {
         row("measured", format!("{value:.4} {unit}"));
     }
-    let source = trial.parent.map_or(String::new(), |parent| format!(" of trial {parent}"));
-    row("source", format!("{}{source}", trial.source.name()));
+    row("source", trial.source.with_parent(trial.parent));
     row("attempt", session.trials.attempt(trial).to_string());
     if let Some(repeats) = points::repeats_of(session, theme, trial.trial) {
         row("repeats", repeats);

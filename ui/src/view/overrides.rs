@@ -32,7 +32,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     };
     let gains: Vec<Line> = model.session.info.gains.iter().enumerate().map(gain).collect();
     let title = match proposal {
-        Some(proposal) => format!("Trial #{}, by: {}", proposal.trial, proposal.source.name()),
+        Some(proposal) => {
+            format!("Trial #{}, source: {}", proposal.trial, proposal.source.with_parent(proposal.parent))
+        }
         None => "Parameters".to_owned(),
     };
     let gain_rows = if gains.is_empty() { 0 } else { gains.len() as u16 + 1 };

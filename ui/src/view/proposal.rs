@@ -2,7 +2,7 @@
 //! best parameters when the study is finished.
 
 use quadfrog::trial::{
-    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, ProposalSource, ProposedParameter, TrialRecord, Verdict,
+    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, ProposedParameter, TrialRecord, Verdict,
 };
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -48,21 +48,15 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
     match (stage, &session.proposal) {
         (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
         (_, Some(proposal)) => {
-            let cause = match (proposal.source, proposal.parent) {
-                _ if stage == Some(ExperimentStage::Running) => " runs".to_owned(),
-                (ProposalSource::Sampler, _) => ", by the sampler".to_owned(),
-                (ProposalSource::Operator, _) => ", overridden".to_owned(),
-                (ProposalSource::Rerun, Some(parent)) => format!(", re-run of #{parent}"),
-                (ProposalSource::Rerun, None) => ", a re-run".to_owned(),
-                (ProposalSource::Confirm, _) => ", to confirm the best".to_owned(),
-                (ProposalSource::Queued, _) => ", from the queue".to_owned(),
-                (ProposalSource::OtherProgram, _) => ", by another program".to_owned(),
+            let source = match stage {
+                Some(ExperimentStage::Running) => " runs".to_owned(),
+                _ => format!(", source: {}", proposal.source.with_parent(proposal.parent)),
             };
             let repeat = match proposal.repeats {
                 0 => String::new(),
                 repeats => format!(", repeat {} of {repeats}", proposal.repeat),
             };
-            let title = format!("Trial #{}{repeat}{cause}", proposal.trial);
+            let title = format!("Trial #{}{repeat}{source}", proposal.trial);
             let mut lines: Vec<Line> =
                 proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);

@@ -158,7 +158,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
         Question::QueueProposed { trial } => {
             let lines = vec![
                 Line::from(format!(
-                    "Trial #{trial} is from the queue itself and remains the proposal: its values run once more after it."
+                    "Trial #{trial} is queued itself and remains the proposal: its values run once more after it."
                 )),
                 Line::default(),
                 answers(&model.theme, "y", "queue"),

@@ -1,6 +1,6 @@
 //! The queue: points that run before the sampler's.
 
-use quadfrog::trial::{ProposalSource, QueuedPoint, six_digits};
+use quadfrog::trial::{QueuedPoint, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{span, truncate};
@@ -31,11 +31,7 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> Vec<Line<'static>>
 
 /// Returns a point in words: `#8  re-run of #3  f0 1.3, Fx 90, Fz 240`.
 fn described(point: &QueuedPoint) -> String {
-    let source = match (point.source, point.parent) {
-        (ProposalSource::Rerun, Some(parent)) => format!("re-run of #{parent}"),
-        (ProposalSource::Confirm, Some(parent)) => format!("confirms #{parent}"),
-        (source, _) => source.name().to_owned(),
-    };
+    let source = point.source.with_parent(point.parent);
     let values = point.parameters.iter().chain(point.gains.iter());
     let values: Vec<_> = values.map(|(name, value)| format!("{name} {}", six_digits(*value))).collect();
     let values = if values.is_empty() { "parameters from the sampler".to_owned() } else { values.join(", ") };
