@@ -244,6 +244,21 @@ fn what_the_operator_has_to_do_is_on_the_first_page() {
     assert_shows(&line, &["you  STOP tested", "found (needed: something)"]);
 }
 
+/// Regression: at 60x20 the title of the arming checks was cut after "checked".
+#[test]
+fn the_title_of_the_arming_checks_is_whole_in_a_narrow_terminal() {
+    let mut console = long_checks();
+    console.mode(Mode::Ready);
+    console.press(&["P"]);
+    let count = ArmingCheck::VARIANTS.len();
+    let screen = console.screen(60, 20);
+    let title = line_with(&screen, "Checks at ");
+    assert_shows(&title, &[&format!(": {count} of {count} not yet (2-12 of ")]);
+    assert!(title.contains(") \u{2500}"), "{screen}");
+    let screen = console.screen(120, 40);
+    assert_shows(&line_with(&screen, "Arming checks: checked at "), &["PgUp PgDn"]);
+}
+
 /// Regressions: an empty box, a list without its length, an old answer below a dialog, a footer without the paging keys.
 #[test]
 fn lists_say_how_long_they_are_and_that_nothing_matches() {

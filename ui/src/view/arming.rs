@@ -125,15 +125,31 @@ fn line(
 
 /// The number of items that forbid arming, in words, with the time of the checks once the robot is armed.
 pub fn summary(model: &Model) -> String {
+    match (result(model), checked_at(model)) {
+        (result, Some(at)) if !result.is_empty() => format!("checked at {at}: {result}"),
+        (result, _) => result,
+    }
+}
+
+/// The title of the list of all items; `short` for a narrow terminal.
+pub fn title(model: &Model, short: bool) -> String {
+    match checked_at(model) {
+        Some(at) if short => format!("Checks at {at}: {}", result(model)),
+        _ => format!("Arming checks: {}", summary(model)),
+    }
+}
+
+fn result(model: &Model) -> String {
     let session = &model.session;
     let needed = session.arming_checks.iter().filter(|item| item.state != ArmingCheckState::NotNeeded).count();
-    let result = match (session.arming_checks.is_empty(), session.failing_checks()) {
-        (true, _) => return String::new(),
+    match (session.arming_checks.is_empty(), session.failing_checks()) {
+        (true, _) => String::new(),
         (false, 0) => format!("{needed} passed"),
         (false, count) => format!("{count} of {needed} not yet"),
-    };
-    match model.arming_checks_are_past() {
-        true => format!("checked at {}: {result}", wall_clock(model, session.arming_checked_ns)),
-        false => result,
     }
+}
+
+/// The time of the checks once the robot is armed.
+fn checked_at(model: &Model) -> Option<String> {
+    model.arming_checks_are_past().then(|| wall_clock(model, model.session.arming_checked_ns))
 }

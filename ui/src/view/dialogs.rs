@@ -21,6 +21,7 @@ use tui_input::Input;
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::{arming, help, log, questions, queue};
+use crate::layout::MIN_COLUMNS;
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose};
@@ -98,7 +99,7 @@ fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, 
     let room = usize::from(area.height.saturating_sub(2));
     // Until the list is paged, the chosen item is visible.
     let scroll = scroll.checked_sub(1).unwrap_or(of_chosen.end.saturating_sub(room));
-    let title = format!("Arming checks: {}", arming::summary(model));
+    let title = arming::title(model, area.width < MIN_COLUMNS);
     render_lines(frame, area, model, (&title, width, "PgUp PgDn"), lines, scroll);
 }
 
@@ -375,10 +376,12 @@ fn render_lines(
     let height = usize::from(area.height).min(lines.len() + 2) as u16;
     let room = usize::from(height.saturating_sub(2));
     let scroll = scroll.min(lines.len().saturating_sub(room));
-    let title = if lines.len() > room {
-        format!("{title} ({}-{} of {}, {keys})", scroll + 1, scroll + room, lines.len())
-    } else {
-        title.to_owned()
+    let shown = format!("{}-{} of {}", scroll + 1, scroll + room, lines.len());
+    // Within the corners and the spaces beside the title; the line below names the keys, too.
+    let fits = |title: &String| title.chars().count() + 4 <= usize::from(width.min(area.width));
+    let title = match lines.len() > room {
+        true => Some(format!("{title} ({shown}, {keys})")).filter(fits).unwrap_or(format!("{title} ({shown})")),
+        false => title.to_owned(),
     };
     let inner = open_box(frame, area, model, &title, width, height);
     let shown: Vec<Line> = lines.into_iter().skip(scroll).take(room).collect();
