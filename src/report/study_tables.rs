@@ -23,26 +23,33 @@ fn parameter_cells(study: &ReportedStudy, row: &TrialRecord) -> impl Iterator<It
     study.parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)))
 }
 
-/// Studies with counts of their trials and their best values.
+/// Studies with counts of their trials and their best values. The unit is in the header where all have the same one: the
+/// table fits a terminal of 80 columns.
 pub fn studies(studies: &[ReportedStudy]) -> Table {
-    let counts = ["trials", "accepted", "falls", "void"].map(|name| Column::number(name, ""));
-    let columns = [Column::text("study"), Column::text("robot")].into_iter().chain(counts);
-    let columns = columns.chain([Column::number("best J", ""), Column::text("unit"), Column::number("trial", "")]);
-    let mut table = Table::new("Studies.", columns);
+    let unit = studies.first().map_or("", |study| &study.unit);
+    let several_units = studies.iter().any(|study| study.unit != unit);
+    let counts = ["trials", "accepted", "falls", "repeats", "void"].map(|name| Column::number(name, ""));
+    let columns = [Column::text("study")].into_iter().chain(counts);
+    let columns = columns.chain([Column::number("best J", if several_units { "" } else { unit })]);
+    let columns = columns.chain(several_units.then(|| Column::text("unit"))).chain([Column::number("trial", "")]);
+    let caption = "Studies. Accepted trials and falls count; repeats that confirm the best and void trials do not.";
+    let mut table = Table::new(caption, columns);
     for study in studies {
-        let count = |verdict| Cell::count(study.with(verdict).count());
+        let counted = |verdict| Cell::count(study.counted().filter(|row| row.verdict == Some(verdict)).count());
+        let repeats = study.rows.iter().filter(|row| row.confirms_best());
         let best = study.best_row();
-        table.rows.push(vec![
-            Cell::text(title(study)),
-            Cell::text(study.robot.clone()),
+        let cells = [
+            Cell::text(format!("{}, {}", title(study), study.robot)),
             Cell::count(study.rows.iter().filter(|row| !row.was_not_run()).count()),
-            count(Verdict::Accept),
-            count(Verdict::Fall),
-            count(Verdict::Void),
+            counted(Verdict::Accept),
+            counted(Verdict::Fall),
+            Cell::count(repeats.count()),
+            Cell::count(study.with(Verdict::Void).count()),
             Cell::optional(best.and_then(|row| row.value), 3),
-            Cell::text(study.unit.clone()),
-            best.map_or(Cell::Missing, |row| Cell::count(row.trial as usize)),
-        ]);
+        ];
+        let unit = several_units.then(|| Cell::text(study.unit.clone()));
+        let trial = best.map_or(Cell::Missing, |row| Cell::count(row.trial as usize));
+        table.rows.push(cells.into_iter().chain(unit).chain([trial]).collect());
     }
     table
 }

@@ -65,7 +65,16 @@ impl TrialRecord {
 
     /// Returns whether it counts for the budget: accepted or fallen. Repeats that confirm the best are beyond the budget.
     pub fn counts(&self) -> bool {
-        matches!(self.verdict, Some(Verdict::Accept | Verdict::Fall)) && self.source != ProposalSource::Confirm
+        self.has_result() && self.source != ProposalSource::Confirm
+    }
+
+    /// Returns whether it is a repeat that confirms the best, accepted or fallen.
+    pub fn confirms_best(&self) -> bool {
+        self.has_result() && self.source == ProposalSource::Confirm
+    }
+
+    fn has_result(&self) -> bool {
+        matches!(self.verdict, Some(Verdict::Accept | Verdict::Fall))
     }
 
     /// Returns the name of its verdict on screens and in reports; a trial that did not run has none, and one of another

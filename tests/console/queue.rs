@@ -79,9 +79,9 @@ fn queued_points_are_seen_moved_and_removed() {
     assert!(shown.contains("0 running, 2 queued\n  #0 f0 1.3, Fx 60, Fz 240\n  #2 f0 1.2, Fx 60, Fz 240"), "{shown}");
     let report = text(&quadfrog(folder.path(), &["report", study.to_str().unwrap()]));
     assert!(report.contains("not run"), "{report}");
-    let row = line_with(&report, "go1, simulated");
-    let counts: Vec<&str> = row.split_whitespace().rev().skip(2).take(4).collect();
-    assert_eq!(counts, ["0"; 4], "void, falls, accepted, trials: {report}");
+    let row = line_with(&report, "forward, seed 3, go1,");
+    let counts: Vec<&str> = row.split_whitespace().rev().skip(2).take(5).collect();
+    assert_eq!(counts, ["0"; 5], "void, repeats, falls, accepted, trials: {report}");
     // A resumed session has the same queue.
     let mut session = Session::start(folder.path(), (80, 24), &["--resume", study.to_str().unwrap()]);
     session.wait_for(&["Press A to arm"]);

@@ -128,6 +128,23 @@ fn best_so_far_counts_accepted_trials_alone() {
     assert_eq!(mean_and_deviation(&[3.0]), (3.0, 0.0));
 }
 
+/// Regressions: the table of the studies was split at 80 columns, and repeats that confirm the best were among the accepted.
+#[test]
+fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {
+    let studies = [study(0, rows()), ReportedStudy { unit: "rad".into(), ..study(12, rows()) }];
+    for studies in [&studies[..1], &studies] {
+        let page = study_page::page(studies, &[], "0.1.0 (test)");
+        let shown = text::render(&page, 80);
+        let results = &shown[shown.find("Studies.").unwrap()..shown.find("Best value so far").unwrap()];
+        assert_eq!(results.matches("accepted").count(), 1, "{results}");
+        assert!(results.lines().all(|line| line.chars().count() <= 80), "{results}");
+        let row = results.lines().find(|line| line.starts_with("forward, seed 0")).unwrap();
+        let numbers: Vec<&str> = row.split_whitespace().skip_while(|word| word.parse::<u32>() != Ok(6)).collect();
+        // Trials, accepted, falls, repeats, void.
+        assert_eq!(numbers[..5], ["6", "3", "1", "1", "1"], "{results}");
+    }
+}
+
 #[test]
 fn chosen_trials_are_found_or_left_out() {
     let study = study(0, rows());
