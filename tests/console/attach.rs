@@ -106,6 +106,23 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     assert!(lab.sockets().is_empty() && lab.listed().is_empty());
 }
 
+/// Regression: where neither USER nor LOGNAME names the user, as in a container, the operator was unknown.
+#[test]
+fn an_operator_without_variables_has_the_login_name() {
+    let lab = Lab::new();
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.env("QUADFROG_SESSIONS", lab.sessions());
+    command.env("USER", "");
+    command.env("LOGNAME", "");
+    let mut session = Session::run(lab.folder.path(), SIZE, command);
+    session.wait_for(&["Press A to arm"]);
+    let login = Command::new("id").arg("-un").output().unwrap();
+    let login = String::from_utf8(login.stdout).unwrap();
+    let listed = lab.listed();
+    assert!(listed.len() == 1 && listed[0].contains(&format!(" {} ", login.trim())), "{listed:?}");
+    assert!(session.quit().success());
+}
+
 #[test]
 fn an_observer_sees_that_its_session_was_killed() {
     let lab = Lab::new();

@@ -1,12 +1,15 @@
 //! The command line: output and exit status of complete runs of the program.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, Permissions};
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Stdio;
 
 use crate::program::{Program, assert_shows, hold, journal_trials};
+use crate::skip::skip;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
 use serde_json::Value;
@@ -288,4 +291,28 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         program.write("notes.txt", "notes");
         assert_shows(&program.refused(arguments), &[wanted]);
     }
+}
+
+/// Regression: the operator of a user without a name, as in a container, was unknown without a word.
+#[test]
+fn an_unknown_operator_is_reported_once_with_the_remedy() {
+    let program = Program::new();
+    let run = |arguments: &[&str]| {
+        let mut command = program.command(&["optimize", "--seed", "0-1", "--trials", "1", "--record", "none"]);
+        // A user without an entry in /etc/passwd.
+        command.args(arguments).env("USER", "").env("LOGNAME", "").uid(54_321);
+        command.output()
+    };
+    fs::set_permissions(program.path("."), Permissions::from_mode(0o777)).unwrap();
+    let output = match run(&[]) {
+        Ok(output) => output,
+        Err(error) => return skip(&format!("this user cannot run a program as another: {error}")),
+    };
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}");
+    assert_eq!(text.matches("the operator is unknown").count(), 1, "{text}");
+    assert_shows(&text, &["--operator NAME"]);
+    let output = run(&["--operator", "Ada"]).unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !text.contains("unknown"), "{text}");
 }

@@ -4,11 +4,13 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Once;
 
 use crate::notice;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap_complete::ArgValueCandidates;
+use nix::unistd::{User, getuid};
 use quadfrog::config::Config;
 use quadfrog::engine::{Provenance, check_kept_config, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
@@ -226,10 +228,17 @@ pub fn operator(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
-/// Returns the name of the operator: the given one, or else the user's.
+/// Returns the name of the operator: the given one, or else the user's. Reports once that there is none.
 pub fn operator_or_user(given: Option<&String>) -> String {
+    static REPORTED: Once = Once::new();
     let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| operator(&std::env::var(name).ok()?).ok());
-    given.cloned().or_else(of_user).unwrap_or_else(unknown)
+    // Neither variable is set in a container.
+    let of_login = || operator(&User::from_uid(getuid()).ok()??.name).ok();
+    given.cloned().or_else(of_user).or_else(of_login).unwrap_or_else(|| {
+        REPORTED
+            .call_once(|| notice!("the operator is unknown, as this user has no name; give one with --operator NAME"));
+        unknown()
+    })
 }
 
 fn unknown() -> String {
