@@ -212,11 +212,21 @@ fn a_continued_study_keeps_its_configuration_and_robot() {
     let study = program.study("recordings");
     let study = study.to_str().unwrap();
     assert_shows(&program.refused(&["optimize", "--resume", study, "--model", "a1"]), &["--model a1", "go1"]);
-    let rest = program.trials(&["optimize", "--resume", study, "--trials", "5", "--json", "--record", "none"]);
+    let resumed = program.run(&["optimize", "--resume", study, "--trials", "5", "--json", "--record", "none"]);
+    let notices = String::from_utf8_lossy(&resumed.stderr);
+    assert_eq!(notices.matches("continuing with the last configuration of the study").count(), 1, "{notices}");
+    let rest: Vec<Value> =
+        String::from_utf8_lossy(&resumed.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(rest.len(), 2);
     assert!(rest.iter().all(|trial| (200.0..=300.0).contains(&trial["params"]["Fz"].as_f64().unwrap())));
     let _held = hold(Path::new(study));
-    assert_shows(&program.refused(&["optimize", "--resume", study, "--trials", "6"]), &["another session"]);
+    // Regression: a refusal came after the notice of the configuration with which the refused session would continue.
+    let refused = program.refused(&["optimize", "--resume", study, "--trials", "6"]);
+    assert_shows(&refused, &["another session"]);
+    assert!(!refused.contains("continuing with"), "{refused}");
+    let refused = program.refused(&["--robot", "go1", "--resume", study]);
+    assert_shows(&refused, &["--accept-backend-change"]);
+    assert!(!refused.contains("continuing with"), "{refused}");
 }
 
 #[test]

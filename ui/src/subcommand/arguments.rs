@@ -257,18 +257,19 @@ impl StudyArguments {
     }
 
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with, else as
-    /// [`load_config_for`].
-    pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<Config, Failure> {
+    /// [`load_config_for`]. Returns also the notice that it is that of the study: for when the study was not refused.
+    pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<(Config, Option<String>), Failure> {
         let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
             check_kept_config(own)?;
-            notice!("continuing with the last configuration of the study, {}", own.display());
         }
         let mut config = load_config_for(robot, self.config.as_deref().or(own.as_deref()))?;
         if let Some(sampler) = self.sampler {
             config.choose_sampler(sampler);
         }
-        Ok(config)
+        let continued =
+            own.map(|own| format!("continuing with the last configuration of the study, {}", own.display()));
+        Ok((config, continued))
     }
 
     /// Returns the folder of a new study, before a number is appended: `<output>/<date>T<time>-<task>-seed<seed>`.

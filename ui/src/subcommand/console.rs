@@ -8,10 +8,10 @@ use crate::connection::TerminalLocation;
 use crate::feed::Feed;
 use crate::graphics::GraphicsChoice;
 use crate::model::RobotFacts;
-use crate::put_line;
 use crate::settings::ConsoleSettings;
 use crate::terminal;
 use crate::theme::{ColourChoice, ThemeChoice};
+use crate::{notice, put_line};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -153,7 +153,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     };
     let model = arguments.study.model.as_deref().unwrap_or(model);
     let (files, robot) = arguments::load_model(model)?;
-    let config = arguments.study.load_config(&files, arguments.resume.as_deref())?;
+    let (config, continued) = arguments.study.load_config(&files, arguments.resume.as_deref())?;
     let network = network(arguments, &files, model)?;
     let console = options(&arguments.screen, &config)?;
     let selected = match &arguments.resume {
@@ -179,11 +179,11 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         guard: Some(PathBuf::from("/proc/self/exe")),
         unseen_connection: TerminalLocation::of(|name| std::env::var(name).ok()).unseen().map(str::to_owned),
         network,
-        provenance: arguments.study.provenance(),
         ..Options::new(config, robot, backend, selected.task)
     };
     engine::check_backend(&options)?;
     terminal::check().map_err(Failure::input)?;
+    options.provenance = arguments.study.provenance();
     options.live = arguments.live.as_deref().map(live::start).transpose()?;
     // An observer writes no files.
     let selected = if arguments.observe { selected } else { selected.with_folder()? };
@@ -194,6 +194,9 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         _ => None,
     };
     let handle = engine::start(options)?;
+    if let Some(continued) = continued {
+        notice!("{continued}");
+    }
     let recorder = handle.recorder_watch();
     notice_waits(None);
     let exit = app::run(Feed::live(handle), console)?;

@@ -88,14 +88,14 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         _ => arguments.resume.as_deref(),
     };
     let (files, robot) = arguments::load_model(arguments.study.model.as_deref().unwrap_or(arguments::DEFAULT_MODEL))?;
-    let config = arguments.study.load_config(&files, existing)?;
+    let (config, continued) = arguments.study.load_config(&files, existing)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,
         None => select(arguments, &config, &robot)?,
     };
     let priors = priors(arguments, existing, &config, &robot, &studies)?;
     let budgets = studies.iter().map(|study| arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
-    let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>());
+    let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>(), continued);
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
     let cores = if joined.is_some() { 1 } else { parallel::cores() };
@@ -231,6 +231,7 @@ fn run_one(
     let name = recording.as_ref().and_then(name).unwrap_or_default();
     // Synced: a judged trial is on disk before the next one is proposed.
     let mut experiment = engine::open_experiment(&options, Durability::Synced, &name.to_string_lossy())?;
+    printer.opened();
     let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
     let mut failed = None;
     // The rollouts of the best trial, and of the present one.

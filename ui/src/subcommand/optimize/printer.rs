@@ -28,11 +28,14 @@ pub struct Printer {
     output: Mutex<()>,
     /// Task, best value and falls of each finished study.
     results: Mutex<Vec<(Task, f64, usize)>>,
+    /// Notice of the configuration with which a study is continued, until it is printed.
+    continued: Mutex<Option<String>>,
 }
 
 impl Printer {
-    /// `budgets`: number of trials of each study, or, if `joined`, of the one study for each worker here.
-    pub fn new(json: bool, joined: bool, config: &Config, budgets: &[u32]) -> Printer {
+    /// `budgets`: number of trials of each study, or, if `joined`, of the one study for each worker here; `continued`: the
+    /// notice of the configuration with which a study is continued.
+    pub fn new(json: bool, joined: bool, config: &Config, budgets: &[u32], continued: Option<String>) -> Printer {
         let one = joined || budgets.len() == 1;
         let bar = std::io::stderr().is_terminal().then(|| {
             let budgets = if one { &budgets[..1] } else { budgets };
@@ -50,6 +53,7 @@ impl Printer {
             objective_units: Task::ALL.map(|task| config.task(task).unit(task)),
             output: Mutex::new(()),
             results: Mutex::default(),
+            continued: Mutex::new(continued),
         }
     }
 
@@ -90,13 +94,23 @@ impl Printer {
         }
     }
 
+    /// Prints once, when a study was opened and not refused, which configuration it continues with.
+    pub fn opened(&self) {
+        if let Some(continued) = self.continued.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            self.notice(&continued);
+        }
+    }
+
     /// Prints a warning about a study on standard error.
     pub fn warn(&self, study: &SelectedStudy, warning: &str) {
+        self.notice(&format!("{} seed {}: {warning}", study.task.name(), study.seed));
+    }
+
+    fn notice(&self, text: &str) {
         let _output = self.output.lock();
-        let print = || output::notice(&format!("{} seed {}: {warning}", study.task.name(), study.seed));
         match &self.bar {
-            Some(bar) => bar.suspend(print),
-            None => print(),
+            Some(bar) => bar.suspend(|| output::notice(text)),
+            None => output::notice(text),
         }
     }
 
