@@ -34,6 +34,8 @@ pub struct ReportedStudy {
     pub rows: Vec<TrialRecord>,
     /// Number of the best trial.
     pub best: Option<u32>,
+    /// Gains of the best trial that differ from the configured ones, in words; empty where none does.
+    pub other_gains_of_best: String,
     /// Result of the newest confirmation of the best, a sentence without its end; none without one.
     pub confirmation: Option<String>,
     /// The best trial by the sampler's model; none without one.

@@ -90,6 +90,9 @@ fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section
         } else {
             section.blocks.push(Block::Table(best));
         }
+        for study in group.iter().filter(|study| !study.other_gains_of_best.is_empty()) {
+            section.paragraph(format!("Best trial of {}, {}.", title(study), study.other_gains_of_best));
+        }
         for study in group {
             if let Some(confirmation) = &study.confirmation {
                 section.paragraph(format!("Confirmation of the best of {}: {confirmation}.", title(study)));

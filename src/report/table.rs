@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
-use crate::trial::{JumpRow, ParameterInfo, TrialRecord, Verdict};
+use crate::trial::{JumpRow, ParameterInfo, ParameterValues, TrialRecord, Verdict};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
@@ -20,10 +20,12 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
     text + "  " + &verdict(row)
 }
 
-/// The best trial as a line, with what the sampler's model says of it, or a line about its absence.
+/// The best trial as a line, with what the sampler's model says of it and its gains that differ from `configured`, or a line
+/// about its absence.
 pub fn best_line(
     best: Option<&TrialRecord>,
     model: Option<ModelBest>,
+    configured: &ParameterValues,
     unit: &str,
     units: &HashMap<String, String>,
 ) -> String {
@@ -34,6 +36,10 @@ pub fn best_line(
             text,
             "      mean by the sampler's model {predicted:.3} {unit}, deviation {predicted_deviation:.3} {unit}"
         );
+    }
+    let other_gains = best.other_gains(configured);
+    if !other_gains.is_empty() {
+        let _ = writeln!(text, "      {other_gains}");
     }
     text
 }

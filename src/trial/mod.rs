@@ -7,7 +7,7 @@ mod search;
 
 pub use self::measured::{BounceRule, CHANGED, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
 pub use self::parameters::{
-    GAIN_UNITS, Gains, JumpParameters, ParameterInfo, ParameterValues, is_gain, parameter_unit,
+    GAIN_UNITS, Gains, JumpParameters, ParameterInfo, ParameterValues, is_gain, other_gains, parameter_unit,
 };
 pub use self::record::{NOT_RUN, REMOVED, SKIPPED, TrialRecord};
 pub use self::search::{

@@ -140,6 +140,24 @@ impl Gains {
     }
 }
 
+/// Returns in words the gains that differ from the configured ones, `other gains: kp 500 (configured 400)`; empty where none
+/// does. Those that are searched as parameters are not among them.
+pub fn other_gains(
+    gains: &ParameterValues,
+    configured: &ParameterValues,
+    is_searched: impl Fn(&str) -> bool,
+) -> String {
+    let different: Vec<String> = configured
+        .iter()
+        .filter(|(name, _)| !is_searched(name))
+        .filter_map(|(name, usual)| {
+            let value = gains.get(name)?;
+            (value != *usual).then(|| format!("{name} {value} (configured {usual})"))
+        })
+        .collect();
+    if different.is_empty() { String::new() } else { format!("other gains: {}", different.join(", ")) }
+}
+
 /// One optimized parameter, or one gain.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ParameterInfo {

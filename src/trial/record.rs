@@ -1,7 +1,8 @@
 //! The row of a trial: values, verdict, origin.
 
 use super::{
-    CHANGED, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterValues, ProposalSource, RepeatRecord, Verdict,
+    CHANGED, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterValues, ProposalSource, RepeatRecord,
+    Verdict, other_gains,
 };
 
 /// A row of the trial table.
@@ -61,6 +62,11 @@ impl TrialRecord {
     pub fn origin(&self) -> String {
         let parent = self.parent.map_or(String::new(), |parent| format!(" {parent}"));
         format!("{}{parent}", self.source.name())
+    }
+
+    /// Returns in words the gains that differ from the configured ones; empty where none does.
+    pub fn other_gains(&self, configured: &ParameterValues) -> String {
+        other_gains(&self.gains, configured, |name| self.parameters.get(name).is_some())
     }
 
     /// Returns whether it counts for the budget: accepted or fallen. Repeats that confirm the best are beyond the budget.

@@ -111,6 +111,30 @@ fn queued_points_are_seen_moved_and_removed() {
     }
 }
 
+/// Regression: the gains that the operator has changed for the best trial were in its note alone.
+#[test]
+fn changed_gains_of_the_best_trial_are_shown_with_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3", "--trials", "1"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("o");
+    session.wait_for(&["Override trial #0", "kp"]);
+    session.send("\x1b[B\x1b[B\x1b[B");
+    session.send("600\r");
+    session.wait_for(&["trial 0 will run with kp 600"]);
+    jump(&mut session);
+    session.send("a");
+    session.wait_for(&["Study finished"]);
+    assert!(session.quit().success());
+    let study = study_of(folder.path());
+    let study = study.to_str().unwrap();
+    let shown = text(&quadfrog(folder.path(), &["study", "show", study]));
+    let best: Vec<&str> = shown.lines().skip_while(|line| !line.starts_with("Best: trial")).collect();
+    assert_eq!(best.get(1), Some(&"      other gains: kp 600 (configured 400)"), "{shown}");
+    let report = text(&quadfrog(folder.path(), &["report", study]));
+    assert!(report.contains("Best trial of forward, seed 3, other gains: kp 600 (configured 400)."), "{report}");
+}
+
 /// The first point of the queue is the proposal: when it is moved or removed, the next one is proposed, and STOP works over the list.
 #[test]
 fn the_proposal_follows_the_queue_and_stop_works_over_it() {

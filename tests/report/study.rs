@@ -92,6 +92,7 @@ fn study(seed: u32, rows: Vec<TrialRecord>) -> ReportedStudy {
         f1_hz: 0.0,
         parameters: vec![info("f0", "Hz", 0.75, 1.75), info("Fx", "N", 0.0, 150.0), info("Fz", "N", 150.0, 350.0)],
         best: Some(1),
+        other_gains_of_best: String::new(),
         confirmation: None,
         model_best: None,
         limits: None,

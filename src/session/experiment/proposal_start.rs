@@ -5,7 +5,7 @@ use super::confirmation::{self, NextRepeat};
 use super::envelope;
 use super::judging::value_of;
 use super::open_proposal::{ApprovedProposal, OpenProposal, model_insight};
-use super::plan::{ExperimentPlan, RequestRefusal, not_now};
+use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
 use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
@@ -16,7 +16,7 @@ use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
     JumpParameters, ParameterInfo, ParameterValues, ProposalInsight, ProposalSource, ProposedParameter, SearchStatus,
-    TrialRecord, Verdict,
+    TrialRecord, Verdict, other_gains,
 };
 
 impl Experiment {
@@ -199,7 +199,7 @@ impl Experiment {
             source: proposal.source,
             parent: proposal.parent,
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            note: gains_note(&gains, &self.plan),
+            note: other_gains(&gains, &self.plan.control.gains().values(), |name| self.plan.optimizes(name)),
             risk: proposal.risk,
             expected: proposal.expected,
             gains,
@@ -307,23 +307,6 @@ impl Experiment {
             ..control.trial(self.plan.task, JumpParameters::from_values(&row.parameters, control.f1_hz))
         }
     }
-}
-
-/// Returns the note on gains that differ from the configured ones, `other gains: kp 500 (configured 400)`; empty without. Gains
-/// that are parameters of the study are not among them.
-fn gains_note(gains: &ParameterValues, plan: &ExperimentPlan) -> String {
-    let different: Vec<String> = plan
-        .control
-        .gains()
-        .values()
-        .iter()
-        .filter(|(name, _)| !plan.optimizes(name))
-        .filter_map(|(name, usual)| {
-            let value = gains.get(name)?;
-            (value != *usual).then(|| format!("{name} {value} (configured {usual})"))
-        })
-        .collect();
-    if different.is_empty() { String::new() } else { format!("other gains: {}", different.join(", ")) }
 }
 
 /// Returns the seed of one trial's noise and terrain: the study's seed, the worker and the trial's place in the order of

@@ -262,7 +262,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
             let _ = writeln!(text, "  #{} {}", queued.number, values.join(", "));
         }
     }
-    text += &best_line(&opened, &rows);
+    text += &best_line(&selector.config()?, &opened, &rows);
     let jumps = opened.best(&rows).and_then(|best| best.measured.as_ref()).map(|measured| &measured.jumps);
     if let (Some(jumps), Some(ours)) = (jumps.filter(|jumps| jumps.len() > 1), ours) {
         text += &table::jumps(jumps, ours.task.unit());
@@ -271,9 +271,10 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     Ok(())
 }
 
-fn best_line(opened: &Opened, rows: &[TrialRecord]) -> String {
+fn best_line(config: &Config, opened: &Opened, rows: &[TrialRecord]) -> String {
+    let configured = opened.ours.as_ref().map(|ours| config.task(ours.task).gains().values()).unwrap_or_default();
     let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
-    table::best_line(opened.best(rows), opened.study.model_best(), opened.unit(), &units)
+    table::best_line(opened.best(rows), opened.study.model_best(), &configured, opened.unit(), &units)
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
@@ -343,14 +344,15 @@ fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> 
     let opened = selector.open()?;
     let rows = rows_of(&opened.study, &opened.parameters);
     let Some(folder) = config else {
-        output::text(&best_line(&opened, &rows));
+        output::text(&best_line(&selector.config()?, &opened, &rows));
         return Ok(());
     };
     let (Some(best), Some(ours)) = (opened.best(&rows), &opened.ours) else {
         return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
-    selector.config()?.export(folder, ours.task, &best.parameters, &best.gains)?;
-    let (text, task, folder) = (best_line(&opened, &rows), ours.task.name(), folder.display());
+    let config = selector.config()?;
+    config.export(folder, ours.task, &best.parameters, &best.gains)?;
+    let (text, task, folder) = (best_line(&config, &opened, &rows), ours.task.name(), folder.display());
     output::text(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"));
     Ok(())
 }

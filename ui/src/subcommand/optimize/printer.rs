@@ -127,7 +127,8 @@ impl Printer {
         }
         let (parameters, unit) = (options.config.parameters(study.task), self.unit(study.task));
         text += &table::table(&rows, best.map(|best| best.trial), &parameters, unit);
-        text += &table::best_line(best, experiment.model_best(), unit, &self.units);
+        let gains = options.config.task(study.task).gains().values();
+        text += &table::best_line(best, experiment.model_best(), &gains, unit, &self.units);
         let folder = study.folder.display();
         text += &match &options.join {
             Some(storage) => format!("The study is in {storage}; the files of this worker are in {folder}\n"),

@@ -76,6 +76,8 @@ fn reported(
     let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len() as u32);
     let jumps = jumps.max().unwrap_or(1);
     let control = ours.map(|ours| config.task(ours.task));
+    let configured = control.map(|control| control.gains().values()).unwrap_or_default();
+    let best = opened.best(&rows);
     let recordings = match &robot {
         Some(robot) => Recordings::read(&recordings(opened, folder), robot),
         None => Recordings::default(),
@@ -93,7 +95,8 @@ fn reported(
         jumps: control.map_or(1, |control| control.jumps).max(jumps),
         f1_hz: control.map_or(0.0, |control| control.f1_hz),
         parameters: opened.parameters.clone(),
-        best: opened.best(&rows).map(|best| best.trial),
+        best: best.map(|best| best.trial),
+        other_gains_of_best: best.map_or(String::new(), |best| best.other_gains(&configured)),
         rows,
         confirmation: ours.and_then(|_| confirmation_in_words(study)),
         model_best: study.model_best().map(|best| PredictedTrial {
