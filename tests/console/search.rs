@@ -354,6 +354,16 @@ fn repeats_are_shown_as_k_of_n_with_their_spread() {
     console.press(&["3"]);
     let screen = console.screen(120, 40);
     assert!(screen.contains("2/2 landed  0.600 m ±0.012  leads, 96 %"), "{screen}");
+    // Regression: a point that the leader has beaten still contended.
+    assert!(line_with(&screen, "2/3 landed").contains("behind"), "{screen}");
+    console.record(Record::Search(SearchStatus { confirming: Some(7), ..search((0.0, 150.0), None) }));
+    let screen = console.screen(120, 40);
+    assert!(line_with(&screen, "2/3 landed").contains("contends"), "{screen}");
+    let certain = point(vec![2, 4], 2, 0.6, Some(0.012), Some(0.9999));
+    console.record(Record::Points(vec![point(vec![0, 5, 6], 2, 0.41, Some(0.05), None), certain]));
+    let screen = console.screen(120, 40);
+    assert!(screen.contains("leads, 100 %") && line_with(&screen, "2/3 landed").contains("behind"), "{screen}");
+    console.record(Record::Search(search((0.0, 150.0), None)));
     console.press(&["2", "/", "2", "Enter", "Enter"]);
     let screen = console.screen(80, 24);
     assert!(line_with(&screen, "repeats").contains("2/2 landed, 0.6000 ± 0.0120 m (#2 #4)"), "{screen}");

@@ -28,9 +28,16 @@ fn line(session: &SessionModel, theme: &Theme, point: &PointRecord, width: usize
         let leads = if width < 40 { " " } else { "  leads, " };
         spans.push(span(theme, Role::Good, format!("{leads}{:.0} %", confidence * 100.0)));
     } else if point.contender && width >= 40 {
-        spans.push(span(theme, Role::Quiet, "  contends"));
+        let state = if is_decided(session) { "  behind" } else { "  contends" };
+        spans.push(span(theme, Role::Quiet, state));
     }
     Line::from(spans)
+}
+
+/// Whether the confirmation is over, or its leader is certain but for the rounding: no other point contends any longer.
+fn is_decided(session: &SessionModel) -> bool {
+    let certain = |point: &PointRecord| point.confidence.is_some_and(|confidence| confidence >= 0.995);
+    session.confirming().is_none() || session.trials.points.iter().any(certain)
 }
 
 /// The repeats of a trial's point in words; none where it ran once.
