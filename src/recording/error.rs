@@ -15,7 +15,7 @@ pub enum RecordingError {
     Exists { path: PathBuf },
     #[error("{}: a recording's name must end in .mcap", path.display())]
     Name { path: PathBuf },
-    #[error("{}: not a regular file; a recording is a file that can be read from any place", path.display())]
+    #[error("{}: not a regular file; name a recording, *.mcap or *.mcap.part, that can be read from any place", path.display())]
     NotAFile { path: PathBuf },
     #[error("{}: no recording there: no session.mcap in it or in the folders below it; name a file or a study's folder", path.display())]
     NoRecording { path: PathBuf },

@@ -90,7 +90,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     session.wait_for(&["Skip the proposal?"]);
     session.send(ESCAPE);
     session.wait_until("the question closes", || !session.screen().contains("Skip the proposal?"));
-    session.wait_for(&["Press g twice", "Trial #0, source: sampler"]);
+    session.wait_for(&["Press g twice", "Trial #0 (sampler)"]);
     // Suspending an armed robot is refused.
     session.send("\x1a");
     session.wait_for(&["Ctrl-Z is not possible: "]);
@@ -122,7 +122,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     override_by(&mut session, ["1,3", "80", "250"]);
     session.wait_for(&["80"]);
     session.send("Q");
-    session.wait_for(&["source: queued"]);
+    session.wait_for(&["(queued)"]);
     session.send("Q");
     session.wait_for(&["Queue it once more?"]);
     session.send("y");

@@ -179,7 +179,7 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
 fn a_point_that_is_queued_twice_is_said_to_be() {
     let (_folder, mut session) = Session::opened((80, 24), &["--seed", "3", "--sampler", "random"]);
     session.send("Q");
-    session.wait_for(&["Trial #0, source: queued"]);
+    session.wait_for(&["Trial #0 (queued)"]);
     session.send("Q");
     session.wait_for(&["Queue it once more?", "remains the proposal"]);
     session.send("n");
@@ -198,11 +198,11 @@ fn a_change_of_the_queue_that_makes_a_re_run_final_says_so() {
     let (_folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
     jump(&mut session);
     session.send("r");
-    session.wait_for(&["Trial #1, source: re-run of #0"]);
+    session.wait_for(&["Trial #1 (re-run of #0)"]);
     session.send("Q");
     session.wait_for(&["Queue it once more?"]);
     session.send("y");
-    session.wait_for(&["the verdict of trial 0 is final now"]);
+    session.wait_for(&["undo no longer reaches the verdict of trial 0"]);
 }
 
 /// Regression: undo dropped the values that were changed for the next proposal, and so did quitting.
@@ -211,7 +211,7 @@ fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     let (folder, mut session) = Session::opened((120, 40), &["--seed", "3", "--sampler", "random"]);
     jump(&mut session);
     session.send("a");
-    session.wait_for(&["Trial #1, source: sampler"]);
+    session.wait_for(&["Trial #1 (sampler)"]);
     session.send("o");
     session.wait_for(&["Override trial #1"]);
     session.send("1.2\r");
@@ -219,19 +219,19 @@ fn the_changed_values_of_the_proposal_stay_over_an_undo_and_a_new_session() {
     session.send("u");
     session.wait_for(&["proposal 1 keeps its changed values"]);
     session.send("a");
-    session.wait_for(&["Trial #1, source: operator"]);
+    session.wait_for(&["Trial #1 (operator)"]);
     assert!(session.quit().success());
     let study = study_of(folder.path());
     let arguments = ["--resume", study.to_str().unwrap(), "--sampler", "sobol"];
     let mut session = Session::start(folder.path(), (120, 40), &arguments);
-    session.wait_for(&["Trial #1, source: operator", "the sampler is sobol from now on"]);
+    session.wait_for(&["Trial #1 (operator)", "the sampler is sobol from now on"]);
     session.send("6");
     session.wait_for(&["kept from before: trial 1 will run with f0 1.2 Hz"]);
     // A re-run takes the number.
     session.send("1");
     jump(&mut session);
     session.send("a");
-    session.wait_for(&["Trial #2, source: sampler"]);
+    session.wait_for(&["Trial #2 (sampler)"]);
     session.send("o");
     session.wait_for(&["Override trial #2"]);
     session.send("1.3\r");

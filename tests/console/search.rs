@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::support::{Console, assert_shows, line_with, requests, session, tick, trial};
+use crate::support::{Console, assert_shows, line_with, proposal, requests, session, tick, trial};
 use quadfrog::config::Config;
 use quadfrog::optimize::journal::WaitedFor;
 use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
@@ -13,8 +13,8 @@ use quadfrog::session::prior::PriorProgress;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
-    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight,
-    SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
+    Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, Proposal, ProposalInsight,
+    ProposalSource, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, ExportedRows, Msg};
@@ -66,6 +66,29 @@ fn gains_are_set_within_their_own_safe_ranges() {
     let screen = console.screen(80, 24);
     assert!(screen.contains("is outside"), "{screen}");
     assert!(matches!(console.model.dialog, Some(Dialog::Override(_))), "a refusal keeps the form open");
+}
+
+/// Regression: a repeat of trial 124 was called "confirm of #12" at 80x24: the title was cut within the number.
+#[test]
+fn the_title_of_a_repeat_names_the_whole_trial() {
+    let mut console = Console::proposed();
+    let repeat = Proposal { source: ProposalSource::Confirm, parent: Some(124), ..proposal(125, 0) };
+    console.record(Record::Proposal(repeat));
+    console.stage(ExperimentStage::Proposed, 125);
+    for (width, height) in [(60, 20), (80, 24), (120, 40)] {
+        assert_shows(&console.screen(width, height), &["Trial #125 (confirm of #124)"]);
+    }
+}
+
+/// A point with another value than the fixed one is not called fixed: that comes with the sampler's next proposal.
+#[test]
+fn a_queued_point_is_not_called_fixed_at_another_value() {
+    let mut console = overriding();
+    for (value, words) in [(75.0, "  fixed at 75.00, 2 more"), (90.0, " then fixed at 90.00, 2 more")] {
+        console.record(Record::Search(search((0.0, 150.0), Some(FixedParameter { value, trials: 2 }))));
+        assert_shows(&console.screen(120, 40), &[words]);
+        assert_shows(&line_with(&console.screen(80, 24), "> Fx"), &["fixed at"]);
+    }
 }
 
 #[test]

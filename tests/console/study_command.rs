@@ -368,7 +368,7 @@ fn fixed_parameters_and_a_confirmation_are_shown_as_sentences() {
     }
     fs::write(&journal, text).unwrap();
     let shown = program.text(&["study", "show", study.to_str().unwrap()]);
-    assert_shows(&shown, &["f0 was fixed at 0.971958 for 1 counted trial, from trial 11"]);
+    assert_shows(&shown, &["f0 was fixed at 0.971958 for 1 counted trial of the sampler, from trial 11"]);
     assert_shows(&shown, &["confirmation of the best: the point of trial 0 leads with 96.2 % confidence"]);
     for raw in ["confirm:", "confirmed:", "fixed:", "model_best", "none"] {
         assert!(!shown.contains(raw), "{raw}:\n{shown}");

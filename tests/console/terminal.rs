@@ -84,7 +84,7 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     session.send("f");
     session.wait_for(&["Did the robot fall?"]);
     session.send("y");
-    session.wait_for(&["Trial #1, source: sampler"]);
+    session.wait_for(&["Trial #1 (sampler)"]);
     if session.screen().contains("DISARMED") {
         session.send("A");
     }
@@ -92,7 +92,7 @@ fn a_session_by_keys_agrees_with_the_recording_and_the_study() {
     session.approve();
     session.wait_for(&["Trial #1: judge it"]);
     session.send("r");
-    session.wait_for(&["Trial #2, source: re-run of #1"]);
+    session.wait_for(&["Trial #2 (re-run of #1)"]);
     assert!(session.quit().success(), "{}", session.screen());
     assert!(session.restored() && session.cooked(), "the terminal is not as before");
 
@@ -293,7 +293,7 @@ fn losing_the_operator_in_mid_jump_lands_the_robot_and_voids_the_trial() {
         command.arg("--resume");
         command.arg(&study);
         let mut session = Session::run(folder.path(), SIZE, command);
-        session.wait_for(&["Trial #1, source: re-run of #0"]);
+        session.wait_for(&["Trial #1 (re-run of #0)"]);
         session.send("q");
         assert!(session.wait().success(), "{way:?}");
     }

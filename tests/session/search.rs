@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::recording::record::Record;
-use quadfrog::session::experiment::{Experiment, RequestRefusal};
+use quadfrog::session::experiment::{Experiment, RequestRefusal, confirmation_in_words};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
@@ -299,6 +299,41 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("% confidence") && words.contains("stood"), "{words}");
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
+}
+
+/// Regression: a simulator without noise gave "100.0 % confidence", because equal repeats have no spread.
+#[test]
+fn equal_repeats_give_no_confidence() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    (0..12).for_each(|_| jump(&mut experiment, 0.0));
+    experiment.confirm_best(60).unwrap();
+    let mut news = News::default();
+    while news.search.as_ref().is_none_or(|search| search.confirming.is_some()) {
+        jump(&mut experiment, 0.0);
+        told(&mut experiment, &mut news);
+        assert!(news.points.iter().all(|point| point.confidence.is_none()), "{:?}", news.points);
+    }
+    let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
+    assert!(words.contains("leads without a confidence, because equal jumps give equal values here"), "{words}");
+    experiment.close().unwrap();
+    let kept = confirmation_in_words(&study_in(folder.path())).expect("it is kept");
+    assert!(words.ends_with(&kept), "{kept}");
+}
+
+/// The answer to a queued point says whether it is the proposal now, and which fixed values are not its own.
+#[test]
+fn a_queued_point_says_what_it_takes_the_place_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.fix("f0", 1.2, 3).unwrap();
+    let point = |f0: f64| [("f0".into(), f0), ("Fx".into(), 60.0), ("Fz".into(), 250.0)];
+    let first = experiment.enqueue(&point(1.5)).unwrap();
+    assert_eq!((first.proposed, first.same), (Some(0), None));
+    assert_eq!(first.not_fixed, [("f0".to_owned(), 1.2)]);
+    let second = experiment.enqueue(&point(1.2)).unwrap();
+    assert_eq!((second.proposed, second.not_fixed), (None, vec![]), "the first one runs before it");
+    assert_eq!(experiment.enqueue(&point(1.5)).unwrap().same, Some(0));
 }
 
 #[test]

@@ -86,18 +86,18 @@ impl BestConfirmation {
         let direction = study.options().direction;
         let compared = compared(&running.trials, study);
         let Some(first) = compared.first() else { return NextRepeat::None };
-        let over = |leader: usize, confidence: f64, message: String| {
+        let over = |leader: usize, confidence: f64, sure: bool, message: String| {
             let (trials, leader) = (running.trials.clone(), compared[leader].trials[0]);
-            let sure = confidence >= self.confidence;
             NextRepeat::Over(Conclusion { trials, leader, confidence, sure }, message)
         };
         if compared.len() < 2 {
             let message = format!("only the point of trial {} is left to compare: nothing to confirm", first.trials[0]);
-            return over(0, 0.0, message);
+            return over(0, NO_CONFIDENCE, false, message);
         }
         match confirm(&compared, direction, self.confidence) {
             Confirmation::Leads(leader, confidence) => {
-                over(leader, confidence, format!("confirmed: {}", lead_text(&compared[leader], confidence)))
+                let confidence = if varies(&compared) { confidence } else { NO_CONFIDENCE };
+                over(leader, confidence, true, format!("confirmed: {}", lead_text(&compared, leader, confidence)))
             }
             Confirmation::Repeat(point) if running.left(study.trials()) > 0 => {
                 match study.trial(compared[point].trials[0]) {
@@ -115,8 +115,8 @@ impl BestConfirmation {
                     true => (rank.confidence, format!("short of {:.0} %", 100.0 * self.confidence)),
                     false => (NO_CONFIDENCE, format!("each point needs {LEAST_REPEATS} jumps to be compared")),
                 };
-                let lead = lead_text(&compared[rank.leader], confidence);
-                over(rank.leader, confidence, format!("the repeats are used up: {lead}; {short}"))
+                let lead = lead_text(&compared, rank.leader, confidence);
+                over(rank.leader, confidence, false, format!("the repeats are used up: {lead}; {short}"))
             }
         }
     }
@@ -145,7 +145,7 @@ impl BestConfirmation {
             }
             (None, Some(running)) => {
                 let compared = compared(&running.trials, study);
-                (compared.len() > 1 && repeated(&compared))
+                (compared.len() > 1 && repeated(&compared) && varies(&compared))
                     .then(|| rank(&compared, study.options().direction))
                     .map(|rank| (compared[rank.leader].trials[0], rank.confidence))
             }
@@ -182,9 +182,9 @@ pub fn confirmation_in_words(study: &Study) -> Option<String> {
     }
     let concluded = kept.confirmed?;
     let points = compared(&concluded.trials, study);
-    let leader = points.iter().find(|point| point.trials.contains(&concluded.leader))?;
+    let leader = points.iter().position(|point| point.trials.contains(&concluded.leader))?;
     let short = if concluded.sure { "" } else { ", less than was wanted" };
-    Some(format!("{}{short}", lead_text(leader, concluded.confidence)))
+    Some(format!("{}{short}", lead_text(&points, leader, concluded.confidence)))
 }
 
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
@@ -229,10 +229,18 @@ fn repeated(compared: &[RepeatedPoint]) -> bool {
     compared.iter().all(|point| point.repeats() >= LEAST_REPEATS)
 }
 
-fn lead_text(point: &RepeatedPoint, confidence: f64) -> String {
+/// Whether the repeats of any point differ. Those of a simulator without noise do not, and say nothing about the next jump of a robot.
+fn varies(compared: &[RepeatedPoint]) -> bool {
+    compared.iter().any(|point| point.deviation().is_some_and(|deviation| deviation > 0.0))
+}
+
+/// The leading point in words.
+fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64) -> String {
+    let point = &compared[leader];
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
     let sure = match confidence > NO_CONFIDENCE {
         true => format!("with {:.1} % confidence", 100.0 * confidence),
+        false if repeated(compared) => "without a confidence, because equal jumps give equal values here".to_owned(),
         false => "without a confidence".to_owned(),
     };
     format!(

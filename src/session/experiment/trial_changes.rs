@@ -8,6 +8,17 @@ use super::queue_changes::queued_points;
 use super::{Experiment, ExperimentState, confirmation, envelope};
 use crate::trial::{ParameterInfo, ParameterValues, ProposalSource, QueuedPoint, six_digits};
 
+/// A point that the operator has queued.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnqueuedPoint {
+    /// The trial of the same point that waits already, if there is one: two are run all the same.
+    pub same: Option<u32>,
+    /// Number of the point if it is the open proposal now, in place of the sampler's.
+    pub proposed: Option<u32>,
+    /// Parameters that are fixed for the sampler at another value, with that value.
+    pub not_fixed: Vec<(String, f64)>,
+}
+
 impl Experiment {
     /// Sets one parameter of the proposal.
     /// Refused when there is no proposal, no such parameter, or the value is outside its bounds.
@@ -135,9 +146,8 @@ impl Experiment {
     }
 
     /// Queues a point, which may hold gains, too; the parameters that it lacks are proposed when it is its turn.
-    /// Returns the queued trial of the same point, if there is one: two are run all the same.
     /// Refused when a value is outside its bounds or a trial is under way.
-    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<Option<u32>, RequestRefusal> {
+    pub fn enqueue(&mut self, point: &[(String, f64)]) -> Result<EnqueuedPoint, RequestRefusal> {
         let is_gain = |(name, _): &(String, f64)| {
             !self.plan.optimizes(name) && self.plan.gains.iter().any(|gain| gain.name == *name)
         };
@@ -146,8 +156,14 @@ impl Experiment {
         let (parameters, gains) = (ParameterValues::from(parameters), ParameterValues::from(gains));
         let twin = |queued: &QueuedPoint| queued.parameters == parameters && queued.gains == gains;
         let same = queued_points(&self.study).into_iter().find(twin).map(|queued| queued.trial);
+        let fixed = self.search.fixed(self.study.trials());
+        let differs = |name: &str, fixed: f64| parameters.get(name).is_some_and(|value| value != fixed);
+        let not_fixed = fixed.into_iter().map(|(name, fixed)| (name, fixed.value));
+        let not_fixed = not_fixed.filter(|(name, fixed)| differs(name, *fixed)).collect();
         self.queue(&parameters, &Origin { gains, ..Origin::new(ProposalSource::Queued) })?;
-        Ok(same)
+        let last = self.study.waiting().last().map(|trial| trial.number);
+        let proposed = self.proposal().map(|proposal| proposal.trial).filter(|trial| Some(*trial) == last);
+        Ok(EnqueuedPoint { same, proposed, not_fixed })
     }
 
     /// Refuses a point with a value outside its present bounds.

@@ -50,13 +50,13 @@ impl Before {
     }
 }
 
-/// Returns in words what a request has done beside what it was asked for: made a verdict final, kept or dropped changed values,
+/// Returns in words what a request has done beside what it was asked for: put a verdict beyond undo, kept or dropped changed values,
 /// drawn the proposal again, ended the confirmation of the best. Empty if nothing.
 fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: &Before) -> String {
     use OperatorRequest::{ClearOverrides, Judge, Override, OverrideGain, Skip, Undo};
     let mut text = String::new();
     if let Some(trial) = before.undoable.filter(|_| experiment.undoable().is_none() && *request != Undo) {
-        text += &format!("; the verdict of trial {trial} is final now");
+        text += &format!("; undo no longer reaches the verdict of trial {trial}");
     }
     if let Some(trial) = before.changed {
         match request {
@@ -112,8 +112,8 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         OperatorRequest::Fix { parameter, value, trials } => {
             experiment.fix(parameter, *value, *trials)?;
             let next = match trials {
-                1 => "next trial that counts".to_owned(),
-                trials => format!("next {trials} trials that count"),
+                1 => "next trial of the sampler that counts".to_owned(),
+                trials => format!("next {trials} trials of the sampler that count"),
             };
             format!("{parameter} is {} for the {next}", six_digits(*value))
         }
@@ -165,10 +165,20 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             experiment.note(*trial, text)?;
             "noted".to_owned()
         }
-        OperatorRequest::Enqueue(parameters) => match experiment.enqueue(parameters)? {
-            None => "queued".to_owned(),
-            Some(same) => format!("queued once more: trial {same} is the same point and waits, too"),
-        },
+        OperatorRequest::Enqueue(parameters) => {
+            let queued = experiment.enqueue(parameters)?;
+            let mut text = match queued.same {
+                None => "queued".to_owned(),
+                Some(same) => format!("queued once more: trial {same} is the same point and waits, too"),
+            };
+            if let Some(trial) = queued.proposed {
+                text += &format!(" as trial {trial}, the proposal now; the sampler's follows");
+            }
+            for (name, fixed) in queued.not_fixed {
+                text += &format!("; its {name} is not the fixed {}", six_digits(fixed));
+            }
+            text
+        }
         OperatorRequest::RemoveQueued { trial } => {
             experiment.remove_queued(*trial)?;
             "it does not run".to_owned()

@@ -387,28 +387,18 @@ impl StickingLeg {
     }
 }
 
-/// Delassus matrix of a contact and the rows of its leg's joints that stick, lower triangle by columns.
+/// Delassus matrix of a contact and the friction rows of its leg that stick, lower triangle by columns; 1 on the diagonal of the others.
 fn sticking_delassus(contact: &ContactConstraint, rows: &[JointConstraint; 3], sticks: &[bool; 3]) -> [Six; 6] {
-    let mut matrix = [[0.0; 6]; 6];
-    for j in 0..3 {
-        for i in j..3 {
-            matrix[j][i] = contact.local.delassus[(i, j)];
-        }
-        for (k, row) in rows.iter().enumerate().filter(|(k, _)| sticks[*k]) {
-            let own: Vector3<f64> = contact.leg_rows.row(j).transpose();
-            matrix[j][3 + k] = dot(&contact.trunk_rows[j], &row.trunk_row) + own.dot(&row.leg_row);
-        }
-    }
-    for j in 0..3 {
-        matrix[3 + j][3 + j] = if sticks[j] { rows[j].delassus } else { 1.0 };
-        for k in j + 1..3 {
-            if sticks[j] && sticks[k] {
-                matrix[3 + j][3 + k] =
-                    dot(&rows[j].trunk_row, &rows[k].trunk_row) + rows[j].leg_row.dot(&rows[k].leg_row);
-            }
-        }
-    }
-    matrix
+    let ([w1, w2, w3], u) = (contact.trunk_rows, contact.leg_rows.transpose());
+    let trunk_rows = [w1, w2, w3, rows[0].trunk_row, rows[1].trunk_row, rows[2].trunk_row];
+    let leg_rows: [Vector3<f64>; 6] =
+        [u.column(0).into(), u.column(1).into(), u.column(2).into(), rows[0].leg_row, rows[1].leg_row, rows[2].leg_row];
+    let is_in = |row: usize| row < 3 || sticks[row - 3];
+    let element = |i: usize, j: usize| match i >= j && is_in(i) && is_in(j) {
+        true => dot(&trunk_rows[i], &trunk_rows[j]) + leg_rows[i].dot(&leg_rows[j]),
+        false => f64::from(i == j),
+    };
+    std::array::from_fn(|j| std::array::from_fn(|i| element(i, j)))
 }
 
 /// Returns the normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1),

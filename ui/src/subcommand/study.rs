@@ -217,7 +217,11 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
                 continue;
             };
             let trials = counted(trials as u32, "counted trial");
-            let _ = writeln!(text, "  {name} was fixed at {} for {trials}, from trial {from}", six_digits(value));
+            let _ = writeln!(
+                text,
+                "  {name} was fixed at {} for {trials} of the sampler, from trial {from}",
+                six_digits(value)
+            );
         }
         if let Some(samplers) = experiment::samplers_in_words(study) {
             let _ = writeln!(text, "  proposed: {samplers}");

@@ -153,7 +153,7 @@ fn no_signals(model: &Model, trial: u32) -> String {
     if let Some(timeline) = &model.timeline {
         return match timeline.has_ticks_of(trial) {
             true => {
-                format!("trial {trial} was not played yet; {} on its row goes to it", model.keymap.key(Action::Open))
+                format!("trial {trial} was not played; {} on its row goes to it", model.keymap.key(Action::Open))
             }
             false => format!("the recording has no ticks of trial {trial}"),
         };

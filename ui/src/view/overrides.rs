@@ -83,7 +83,12 @@ fn search_state(model: &Model, info: &ParameterInfo) -> Option<Span<'static>> {
     let searched = model.session.searched(&info.name)?;
     match searched.fixed {
         Some(fixed) => {
-            Some(span(theme, Role::Warning, format!(" fixed at {}, {} more", number(fixed.value), fixed.trials)))
+            // A queued point has values of its own.
+            let proposal = model.session.open_proposal();
+            let value = proposal.and_then(|proposal| proposal.parameters.iter().find(|p| p.name == info.name));
+            let has_it = value.is_none_or(|p| p.value == fixed.value);
+            let when = if has_it { " " } else { " then " };
+            Some(span(theme, Role::Warning, format!("{when}fixed at {}, {} more", number(fixed.value), fixed.trials)))
         }
         None if (searched.low, searched.high) != (info.low, info.high) => {
             let (low, high) = (number(info.low), number(info.high));

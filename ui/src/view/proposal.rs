@@ -50,7 +50,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
         (_, Some(proposal)) => {
             let source = match stage {
                 Some(ExperimentStage::Running) => " runs".to_owned(),
-                _ => format!(", source: {}", proposal.source.with_parent(proposal.parent)),
+                _ => format!(" ({})", proposal.source.with_parent(proposal.parent)),
             };
             let repeat = match proposal.repeats {
                 0 => String::new(),
