@@ -20,7 +20,6 @@ mod motion;
 mod quantities;
 pub(crate) mod ranges;
 mod sensors;
-mod six;
 mod spatial;
 mod state;
 mod step;
