@@ -219,7 +219,7 @@ fn a_value_by_hand_far_from_the_measured_one_is_asked_about() {
         let text = format!("Trial #0: {value} m by hand, but the robot measured 0.420 m.");
         assert_shows(&console.screen(80, 24), &["Is this value right?", &text, "Press y to use the value"]);
         assert_eq!(console.requests(&["n"]), []);
-        console.press(&["="]);
+        assert_shows(&console.screen(80, 24), &["Trial #0, measured by hand", &value.to_string()]);
         console.enter(typed);
         assert_eq!(console.requests(&["Enter", "y"]), [OperatorRequest::HandValue(Some(value))]);
     }

@@ -132,9 +132,13 @@ pub fn study_to_continue(
         return Err(Failure::Input(format!("{name}: this is a file; give the folder of the study that it lies in")));
     }
     if !file.is_file() {
+        let found = match folder.is_dir() {
+            true => format!("there is no {STUDY_FILE} in this folder"),
+            false => "there is no such folder".to_owned(),
+        };
+        let name = folder.display();
         return Err(Failure::Input(format!(
-            "{}: there is no {STUDY_FILE} in this folder; give the folder of an earlier study, as printed at its end",
-            folder.display()
+            "{name}: {found}; give the folder of a study, as `quadfrog study list` names it"
         )));
     }
     let stored = stored_study(&file)?;

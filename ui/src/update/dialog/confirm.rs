@@ -5,14 +5,14 @@ use std::time::Duration;
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
-use quadfrog::trial::Verdict;
+use quadfrog::trial::{Verdict, six_digits};
 
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::legal::legal;
 use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Question};
+use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Purpose, Question};
 use crate::update::perform::queued_values;
 use crate::update::request::{cancelled, refused, request, say};
 
@@ -129,7 +129,11 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
         Question::HandValue { value, .. } if yes => {
             request_if_legal(model, Action::HandValue, OperatorRequest::HandValue(Some(*value)), "not used")
         }
-        Question::HandValue { .. } => cancelled(model, "nothing was changed"),
+        Question::HandValue { trial, value } => {
+            // Back to the field, where typing replaces the number.
+            model.dialog = Some(Dialog::field(Purpose::HandValue(*trial), &six_digits(*value)));
+            Vec::new()
+        }
     }
 }
 
