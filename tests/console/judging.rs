@@ -225,6 +225,11 @@ fn a_value_by_hand_far_from_the_measured_one_is_asked_about() {
     }
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     console.press(&["="]);
+    console.enter("99.12345678");
+    console.press(&["Enter", "n"]);
+    assert_shows(&console.screen(80, 24), &["99.12345678"]);
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["="]);
     console.enter("0.45");
     assert_eq!(console.requests(&["Enter"]), [OperatorRequest::HandValue(Some(0.45))], "a tape measure's correction");
 }

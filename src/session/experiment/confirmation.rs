@@ -240,7 +240,9 @@ fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64) -> Stri
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
     let sure = match confidence > NO_CONFIDENCE {
         true => format!("with {:.1} % confidence", 100.0 * confidence),
-        false if repeated(compared) => "without a confidence, because equal jumps give equal values here".to_owned(),
+        false if repeated(compared) && !varies(compared) => {
+            "without a confidence, because equal jumps give equal values here".to_owned()
+        }
         false => "without a confidence".to_owned(),
     };
     format!(

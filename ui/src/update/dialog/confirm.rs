@@ -5,7 +5,7 @@ use std::time::Duration;
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
-use quadfrog::trial::{Verdict, six_digits};
+use quadfrog::trial::Verdict;
 
 use crate::action::Action;
 use crate::keymap::Key;
@@ -131,7 +131,7 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
         }
         Question::HandValue { trial, value } => {
             // Back to the field, where typing replaces the number.
-            model.dialog = Some(Dialog::field(Purpose::HandValue(*trial), &six_digits(*value)));
+            model.dialog = Some(Dialog::field(Purpose::HandValue(*trial), &value.to_string()));
             Vec::new()
         }
     }
