@@ -82,7 +82,8 @@ impl Simulator {
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
             }
-            self.sum_contacts(h);
+            self.sum_contacts();
+            self.solver.loose_blocks().iter().for_each(|block| self.terrain.move_block(block));
         }
         self.terrain.advance(h);
         semi_implicit_euler(&mut self.state, &velocity, h);
@@ -105,8 +106,8 @@ impl Simulator {
         world_from_body
     }
 
-    /// Adds up the contact impulses, and pushes loose blocks.
-    fn sum_contacts(&mut self, h: f64) {
+    /// Adds up the contact impulses.
+    fn sum_contacts(&mut self) {
         self.contacts.foot = [false; 4];
         for contact in self.solver.contacts() {
             let normal = contact.normal_impulse();
@@ -121,9 +122,6 @@ impl Simulator {
                     self.contacts.foot_normal_impulse[leg as usize] += normal;
                 }
                 None => self.contacts.body |= self.collider.signals_fall(contact.warm_start_slot),
-            }
-            if let Some(block) = contact.block {
-                self.terrain.push_block(block, &-impulse_world, h);
             }
         }
     }

@@ -9,12 +9,17 @@ use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::{Dynamics, Six, add_scaled, dot};
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
 use crate::sim::quantities::stack;
+use crate::sim::terrain::LooseBlock;
 
 /// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
 /// the next step.
 const MAX_CONTACTS: usize = 40;
 /// A stop and a friction row per joint.
 const MAX_JOINT_ROWS: usize = 2 * JOINTS;
+
+/// Sweeps in which the limit of the floor's friction under a loose block follows the impulses on the block. With a fixed limit the
+/// sweeps reduce one energy, and converge.
+const FLOOR_SWEEPS: u32 = 10;
 
 /// Three constraint rows of one contact: normal, tangent, tangent.
 #[derive(Debug, Clone, Copy)]
@@ -23,8 +28,8 @@ pub(in crate::sim) struct ContactConstraint {
     leg: usize,
     /// Index of its warm-start impulse.
     pub warm_start_slot: usize,
-    /// Loose block under the point.
-    pub block: Option<usize>,
+    /// Index of its block in [`ContactSolver::on_blocks`], if that is loose.
+    on_block: Option<usize>,
     /// Columns normal, two tangents, body axes.
     axes_body: Matrix3<f64>,
     /// W.
@@ -38,6 +43,17 @@ pub(in crate::sim) struct ContactConstraint {
     impulse: Vector3<f64>,
     /// Impulse of the ground on the robot, world, N s; known after [`ContactSolver::solve`].
     pub impulse_world: Vector3<f64>,
+}
+
+/// A contact whose ground is a loose block.
+#[derive(Debug, Clone, Copy)]
+struct ContactOnBlock {
+    /// Index in [`ContactSolver::loose_blocks`].
+    block: usize,
+    /// Columns normal, two tangents, world.
+    axes_world: Matrix3<f64>,
+    /// The contact while the block slides; [`ContactConstraint::local`] is the contact with a block at rest.
+    sliding: LocalProblem,
 }
 
 /// The constraint row of a joint's stop or dry friction: an impulse between two bounds.
@@ -65,6 +81,9 @@ pub(in crate::sim) struct ContactSolver {
     slip_time_s: f64,
     contacts: Vec<ContactConstraint>,
     joint_rows: Vec<JointConstraint>,
+    on_blocks: Vec<ContactOnBlock>,
+    /// Loose blocks under the contacts.
+    loose_blocks: Vec<LooseBlock>,
     /// Impulses of the last step in world axes, by [`ContactPoint::warm_start_slot`].
     warm_start: Vec<Option<Vector3<f64>>>,
     /// Slots of `warm_start` that hold an impulse.
@@ -81,6 +100,8 @@ impl ContactSolver {
             config,
             contacts: Vec::with_capacity(MAX_CONTACTS),
             joint_rows: Vec::with_capacity(MAX_JOINT_ROWS),
+            on_blocks: Vec::with_capacity(MAX_CONTACTS),
+            loose_blocks: Vec::with_capacity(MAX_CONTACTS),
             warm_start: vec![None; warm_start_slots],
             warm_slots: Vec::with_capacity(MAX_CONTACTS),
             friction_warm_start: [0.0; JOINTS],
@@ -92,8 +113,7 @@ impl ContactSolver {
 
     /// Removes all constraints and warm-start impulses.
     pub fn reset(&mut self) {
-        self.contacts.clear();
-        self.joint_rows.clear();
+        self.clear();
         self.warm_start.fill(None);
         self.warm_slots.clear();
         self.friction_warm_start = [0.0; JOINTS];
@@ -101,9 +121,15 @@ impl ContactSolver {
 
     /// Starts a step of `h` seconds.
     pub fn start(&mut self, h: f64) {
+        self.clear();
+        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
+    }
+
+    fn clear(&mut self) {
         self.contacts.clear();
         self.joint_rows.clear();
-        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
+        self.on_blocks.clear();
+        self.loose_blocks.clear();
     }
 
     pub fn is_empty(&self) -> bool {
@@ -113,6 +139,11 @@ impl ContactSolver {
     /// The contacts of this step; their impulses are those of the last step until [`ContactSolver::solve`].
     pub fn contacts(&self) -> &[ContactConstraint] {
         &self.contacts
+    }
+
+    /// The loose blocks under these contacts; they have the velocity of the end of the step after [`ContactSolver::solve`].
+    pub fn loose_blocks(&self) -> &[LooseBlock] {
+        &self.loose_blocks
     }
 
     /// Part of the right-hand side that a gap adds, from gap + h v >= 0, m/s or rad/s. Of a penetration only a share is
@@ -171,10 +202,11 @@ impl ContactSolver {
             Some(impulse_world) => axes_body.tr_mul(&step.world_from_body.tr_mul(&impulse_world)),
             None => Vector3::zeros(),
         };
+        let on_block = point.block.map(|block| self.add_on_block(step, block, axes_body, delassus, point.friction));
         self.contacts.push(ContactConstraint {
             leg: point.leg,
             warm_start_slot: point.warm_start_slot,
-            block: point.block,
+            on_block,
             axes_body,
             trunk_rows,
             leg_rows,
@@ -183,6 +215,28 @@ impl ContactSolver {
             impulse: into_cone(&warm_start, point.friction),
             impulse_world: Vector3::zeros(),
         });
+    }
+
+    /// Adds the part of a contact that concerns its loose block `index`; returns its index.
+    fn add_on_block(
+        &mut self,
+        step: &StepContext,
+        index: usize,
+        axes_body: Matrix3<f64>,
+        delassus: Matrix3<f64>,
+        friction: f64,
+    ) -> usize {
+        let block = self.loose_blocks.iter().position(|block| block.index == index).unwrap_or_else(|| {
+            self.loose_blocks.push(step.terrain.loose_block(index, step.h));
+            self.loose_blocks.len() - 1
+        });
+        let axes_world = step.world_from_body * axes_body;
+        // A block moves in the world's horizontal plane.
+        let horizontal = axes_world.fixed_rows::<2>(0);
+        let with_block = delassus + horizontal.tr_mul(&horizontal) * self.loose_blocks[block].mobility();
+        let sliding = LocalProblem::new(self.law, friction, with_block);
+        self.on_blocks.push(ContactOnBlock { block, axes_world, sliding });
+        self.on_blocks.len() - 1
     }
 
     /// Adds the row of the stop of joint `joint` that pushes in the direction `sign`. `rhs` is the velocity in that direction, to
@@ -230,18 +284,21 @@ impl ContactSolver {
         let mut sums = ImpulseSums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
         for contact in &self.contacts {
             contact.add(&mut sums, &contact.impulse);
+            if let Some(on_block) = contact.on_block.map(|i| &self.on_blocks[i]) {
+                self.loose_blocks[on_block.block].push(&-(on_block.axes_world * contact.impulse));
+            }
         }
         for row in &self.joint_rows {
             row.add(&mut sums, row.impulse);
         }
-        for _ in 0..self.config.max_sweeps {
+        for sweep in 0..self.config.max_sweeps {
+            if sweep < FLOOR_SWEEPS {
+                self.loose_blocks.iter_mut().for_each(LooseBlock::limit_floor_friction);
+            }
             let mut change: f64 = 0.0;
             for contact in &mut self.contacts {
-                let (impulse, changed) = contact.local.solve(&contact.velocity(&sums), &contact.impulse);
-                let step = impulse - contact.impulse;
-                contact.impulse = impulse;
-                contact.add(&mut sums, &step);
-                change = change.max(changed);
+                let on_block = contact.on_block.map(|i| &mut self.on_blocks[i]);
+                change = change.max(contact.solve(&mut sums, on_block, &mut self.loose_blocks));
             }
             for row in &mut self.joint_rows {
                 let velocity = row.rhs + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
@@ -299,6 +356,40 @@ impl ContactConstraint {
         let [w1, w2, w3] = &self.trunk_rows;
         let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
         self.rhs + trunk + self.leg_rows * sums.legs[self.leg]
+    }
+
+    /// Solves for the impulse with all others fixed; returns the change of the velocity that it makes, m/s.
+    #[inline]
+    fn solve(
+        &mut self,
+        sums: &mut ImpulseSums,
+        on_block: Option<&mut ContactOnBlock>,
+        loose_blocks: &mut [LooseBlock],
+    ) -> f64 {
+        let velocity = self.velocity(sums);
+        let Some(ContactOnBlock { block, axes_world, sliding }) = on_block else {
+            let (impulse, change) = self.local.solve(&velocity, &self.impulse);
+            self.set_impulse(sums, &impulse);
+            return change;
+        };
+        let block = &mut loose_blocks[*block];
+        let push = |impulse: &Vector3<f64>| *axes_world * (self.impulse - impulse);
+        // The impulse on a block at rest, if the block rests under it; otherwise that on a block with the floor's present friction.
+        let (mut impulse, mut change) =
+            self.local.solve(&(velocity - axes_world.tr_mul(&block.stop_world())), &self.impulse);
+        if !block.rests_with(&push(&impulse)) {
+            let velocity = velocity - axes_world.tr_mul(&block.velocity_change_world());
+            (impulse, change) = sliding.solve(&velocity, &self.impulse);
+        }
+        block.push(&push(&impulse));
+        self.set_impulse(sums, &impulse);
+        change
+    }
+
+    #[inline]
+    fn set_impulse(&mut self, sums: &mut ImpulseSums, impulse: &Vector3<f64>) {
+        self.add(sums, &(impulse - self.impulse));
+        self.impulse = *impulse;
     }
 
     /// Adds the impulse `p` to the sums.

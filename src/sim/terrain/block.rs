@@ -13,8 +13,8 @@ pub(super) struct TerrainBlock {
     /// Coulomb coefficient of its surface.
     pub friction: f64,
     pub velocity: Vector2<f64>,
-    /// Whether a foot has pushed it in this step.
-    pub pushed: bool,
+    /// Whether `velocity` is that of the end of this step.
+    pub moved: bool,
     /// Whether it is in the list of the blocks that move.
     pub listed: bool,
 }
@@ -23,7 +23,7 @@ impl TerrainBlock {
     /// Returns a block at rest whose top is at height zero.
     pub fn new(center: Vector2<f64>, half: Vector2<f64>, axis: Vector2<f64>, friction: f64) -> TerrainBlock {
         let velocity = Vector2::zeros();
-        TerrainBlock { center, half, axis, top: 0.0, friction, velocity, pushed: false, listed: false }
+        TerrainBlock { center, half, axis, top: 0.0, friction, velocity, moved: false, listed: false }
     }
 
     /// Distance of the outline's corners from the centre, m.

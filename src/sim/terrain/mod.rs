@@ -2,15 +2,16 @@
 
 mod block;
 mod grid;
+mod loose_block;
 
 use nalgebra::{Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::config::{BlocksConfig, TerrainConfig, TerrainKind};
-use crate::robot::GRAVITY;
 use block::TerrainBlock;
 use grid::BlockGrid;
+pub(super) use loose_block::LooseBlock;
 
 /// Length and half of the width of a step: each extends to the far end, below all later ones, m.
 const FAR_M: f64 = 100.0;
@@ -58,7 +59,7 @@ pub(super) struct Terrain {
     friction: f64,
     blocks: Vec<TerrainBlock>,
     grid: BlockGrid,
-    /// Loose blocks that a foot has pushed or that move.
+    /// Loose blocks that the robot touches or that move.
     moving: Vec<u32>,
     /// Largest height of the ground above the plane, m.
     highest: f64,
@@ -224,34 +225,29 @@ impl Terrain {
         })
     }
 
-    /// Applies a foot's impulse (world, N s) to loose block `block` in a step of `h` seconds, less the friction on the
-    /// floor.
-    pub fn push_block(&mut self, block: usize, impulse_world: &Vector3<f64>, h: f64) {
-        self.blocks[block].pushed = true;
-        if !std::mem::replace(&mut self.blocks[block].listed, true) {
-            self.moving.push(block as u32);
+    /// Returns loose block `block` at the start of a step of `h` seconds.
+    pub fn loose_block(&self, block: usize, h: f64) -> LooseBlock {
+        LooseBlock::new(block, &self.config.blocks, self.blocks[block].velocity, h)
+    }
+
+    /// Gives a loose block its velocity at the end of the step.
+    pub fn move_block(&mut self, moved: &LooseBlock) {
+        let block = &mut self.blocks[moved.index];
+        block.velocity = moved.velocity;
+        block.moved = true;
+        if !std::mem::replace(&mut block.listed, true) {
+            self.moving.push(moved.index as u32);
         }
-        self.accelerate(block, impulse_world, h);
     }
 
-    fn accelerate(&mut self, block: usize, impulse_world: &Vector3<f64>, h: f64) {
-        let BlocksConfig { mass_kg, floor_friction, .. } = self.config.blocks;
-        let block = &mut self.blocks[block];
-        // Coulomb: the floor takes at most mu (m g h + normal impulse) of the momentum.
-        let momentum = block.velocity * mass_kg + impulse_world.xy();
-        let most = floor_friction * (mass_kg * GRAVITY * h - impulse_world.z.min(0.0));
-        let size = momentum.norm();
-        block.velocity = if size <= most { Vector2::zeros() } else { momentum * ((1.0 - most / size) / mass_kg) };
-    }
-
-    /// Advances the loose blocks by `h` seconds; those that no foot has pushed since the last call are slowed by friction
-    /// on the floor.
+    /// Advances the loose blocks by `h` seconds; those that have no velocity from [`Terrain::move_block`] since the last call are
+    /// slowed by friction on the floor.
     pub fn advance(&mut self, h: f64) {
         let mut listed = 0;
         while listed < self.moving.len() {
             let i = self.moving[listed] as usize;
-            if !std::mem::replace(&mut self.blocks[i].pushed, false) {
-                self.accelerate(i, &Vector3::zeros(), h);
+            if !std::mem::replace(&mut self.blocks[i].moved, false) {
+                self.blocks[i].velocity = self.loose_block(i, h).velocity;
             }
             let block = &mut self.blocks[i];
             block.center += block.velocity * h;
@@ -310,6 +306,13 @@ mod tests {
         let terrain = SimConfig::default().terrain;
         let blocks = BlocksConfig { count, area_m: Some(area_m), edge_m, layers, loose: true, ..terrain.blocks };
         TerrainConfig { kind: TerrainKind::Blocks, blocks, ..terrain }
+    }
+
+    /// Pushes a loose block with `impulse_world` (N s) in a step of 1 ms.
+    fn push_block(terrain: &mut Terrain, block: usize, impulse_world: &Vector3<f64>) {
+        let mut block = terrain.loose_block(block, 0.001);
+        block.push(impulse_world);
+        terrain.move_block(&block);
     }
 
     /// Sparse and dense, small and large blocks, far more cells than blocks and a single cell.
@@ -378,7 +381,7 @@ mod tests {
                 for _ in 0..20 {
                     let block = between(0.0, terrain.blocks.len() as f64, &mut random) as usize;
                     let push = Vector3::new(between(-1.0, 1.0, &mut random), between(-1.0, 1.0, &mut random), 0.0);
-                    terrain.push_block(block, &push, 0.001);
+                    push_block(&mut terrain, block, &push);
                 }
                 for _ in 0..100 {
                     terrain.advance(0.001);
@@ -436,11 +439,11 @@ mod tests {
     #[test]
     fn every_block_that_no_foot_pushes_comes_to_rest() {
         let mut terrain = Terrain::new(&config(100, [-3.0, 3.0, -3.0, 3.0], [0.1, 0.2], 1));
-        terrain.push_block(3, &Vector3::new(0.06, 0.0, 0.0), 0.001);
+        push_block(&mut terrain, 3, &Vector3::new(0.06, 0.0, 0.0));
         terrain.advance(0.001);
         assert!(terrain.block_velocity(3).x > 0.5);
         for _ in 0..1000 {
-            terrain.push_block(67, &Vector3::new(0.0, 0.0, -0.01), 0.001);
+            push_block(&mut terrain, 67, &Vector3::new(0.0, 0.0, -0.01));
             terrain.advance(0.001);
         }
         assert_eq!(terrain.block_velocity(3), Vector3::zeros());
