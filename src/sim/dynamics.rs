@@ -20,26 +20,10 @@ use nalgebra::{Matrix3, Vector3};
 use simba::simd::{SimdComplexField, SimdValue};
 
 use super::model::{Lanes, LegsModel, RobotModel};
+use super::six::{Cholesky6, Six};
 use super::spatial::{AxisRotation, SpatialForce, SpatialInertia, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg};
-
-/// A six-vector of the trunk. A plain array, which the compiler vectorizes.
-pub(super) type Six = [f64; 6];
-
-/// a . b
-#[inline]
-pub(super) fn dot(a: &Six, b: &Six) -> f64 {
-    (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
-}
-
-/// y += s x
-#[inline]
-pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += s * x;
-    }
-}
 
 /// Kinematics of all legs and their coupling to the trunk; one lane per leg.
 #[derive(Debug, Clone)]
@@ -85,9 +69,8 @@ pub(super) struct Dynamics {
     pub composite: SpatialInertia<f64>,
     /// b of the trunk's rows.
     pub bias: Six,
-    /// L: lower Cholesky factor of I_A by columns. The reciprocals of its diagonal are separate.
-    factor: [Six; 6],
-    factor_diagonal_inverse: Six,
+    /// L: factor of I_A.
+    pub factor: Cholesky6,
 }
 
 /// Returns the joints of all legs as lanes.
@@ -287,9 +270,9 @@ impl Dynamics {
                 articulated[j][i] -= sum(f1[i] * g1[j] + f2[i] * g2[j] + f3[i] * g3[j]);
             }
         }
-        let factor_diagonal_inverse = cholesky(&mut articulated);
+        let factor = Cholesky6::new(articulated);
         let (f, n) = (&bias.linear, &bias.angular);
-        Dynamics { legs, composite, bias: [f.x, f.y, f.z, n.x, n.y, n.z], factor: articulated, factor_diagonal_inverse }
+        Dynamics { legs, composite, bias: [f.x, f.y, f.z, n.x, n.y, n.z], factor }
     }
 
     /// a = M^-1 ([0; tau] - b).
@@ -302,8 +285,8 @@ impl Dynamics {
         for (i, trunk) in trunk.iter_mut().enumerate() {
             *trunk = -*trunk - sum(f1[i] * free[0] + f2[i] * free[1] + f3[i] * free[2]);
         }
-        self.solve_lower(&mut trunk);
-        self.solve_upper(&mut trunk);
+        self.factor.solve_lower(&mut trunk);
+        self.factor.solve_upper(&mut trunk);
         let [hip, thigh, calf] = self.legs.follow(&free, &trunk);
         let joint: [[f64; LEGS]; 3] = [hip.into(), thigh.into(), calf.into()];
         Acceleration {
@@ -402,28 +385,6 @@ impl Dynamics {
         let bias: [Lanes; 3] = self.legs.bias;
         std::array::from_fn::<f64, JOINTS, _>(|i| bias[i % 3].extract(i / 3))
     }
-
-    /// Replaces x by L^-1 x.
-    #[inline]
-    pub fn solve_lower(&self, x: &mut Six) {
-        for j in 0..6 {
-            x[j] *= self.factor_diagonal_inverse[j];
-            for i in j + 1..6 {
-                x[i] -= self.factor[j][i] * x[j];
-            }
-        }
-    }
-
-    /// Replaces x by L^-T x.
-    #[inline]
-    pub fn solve_upper(&self, x: &mut Six) {
-        for j in (0..6).rev() {
-            for i in j + 1..6 {
-                x[j] -= self.factor[j][i] * x[i];
-            }
-            x[j] *= self.factor_diagonal_inverse[j];
-        }
-    }
 }
 
 /// Sum over the legs.
@@ -450,23 +411,4 @@ pub(super) fn columns(inertia: &SpatialInertia<f64>) -> [Six; 6] {
         [h.z, 0.0, -h.x, i.xy, i.yy, i.yz],
         [-h.y, h.x, 0.0, i.xz, i.yz, i.zz],
     ]
-}
-
-/// A = L L^T in place (columns, lower triangle); returns the reciprocals of the diagonal of L.
-#[inline]
-fn cholesky(a: &mut [Six; 6]) -> Six {
-    let mut inverse = [0.0; 6];
-    for j in 0..6 {
-        let d = 1.0 / a[j][j].sqrt();
-        inverse[j] = d;
-        for x in &mut a[j][j..] {
-            *x *= d;
-        }
-        for k in j + 1..6 {
-            for i in k..6 {
-                a[k][i] -= a[j][i] * a[j][k];
-            }
-        }
-    }
-    inverse
 }

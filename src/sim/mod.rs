@@ -20,6 +20,7 @@ mod motion;
 mod quantities;
 pub(crate) mod ranges;
 mod sensors;
+mod six;
 mod spatial;
 mod state;
 mod step;

@@ -6,8 +6,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
-use super::dynamics::{Dynamics, Six, columns};
+use super::dynamics::{Dynamics, columns};
 use super::model::RobotModel;
+use super::six::Six;
 use super::spatial::{SpatialForce, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg, leg_of};

@@ -4,11 +4,12 @@ use nalgebra::Matrix3;
 
 use super::Simulator;
 use super::collision::Collider;
-use super::dynamics::{Dynamics, add_scaled};
+use super::dynamics::Dynamics;
 use super::flight::flight_step;
 use super::integrate::{free_velocity, semi_implicit_euler};
 use super::joint_stop::add_joint_constraints;
 use super::motion::{GeneralizedVelocity, StepContext};
+use super::six::add_scaled;
 use super::state::PeriodContacts;
 use crate::robot::{CONTROL_PERIOD_S, JOINTS, JointCommand};
 

@@ -36,14 +36,20 @@ impl LocalProblem {
                 p.y - (i.m12 * v.x + i.m22 * v.y + i.m23 * v.z),
                 p.z - (i.m13 * v.x + i.m23 * v.y + i.m33 * v.z),
             );
-            let limit = self.friction * stick.x;
-            if stick.x >= 0.0 && stick.y * stick.y + stick.z * stick.z <= limit * limit {
+            if self.holds(&stick) {
                 self.slip_ratio = 0.0;
                 return (stick, largest(v));
             }
         }
         let impulse = if c_normal < 0.0 { self.slide(&(v - self.delassus * p)) } else { Vector3::zeros() };
         (impulse, largest(&(self.delassus * (impulse - p))))
+    }
+
+    /// Returns whether the impulse is in the friction cone.
+    #[inline]
+    pub fn holds(&self, impulse: &Vector3<f64>) -> bool {
+        let limit = self.friction * impulse.x;
+        impulse.x >= 0.0 && impulse.y * impulse.y + impulse.z * impulse.z <= limit * limit
     }
 
     /// Returns the impulse of a sliding point when the velocity without it is `c`, with a normal component below zero.

@@ -15,6 +15,7 @@
 //! Hutter, "Per-contact iteration method for solving contact dynamics", IEEE RA-L 3(2), 2018. That paper bisects for
 //! the impulse of most dissipation; [`law`] solves the contact law itself, reduced to one scalar equation as in
 //! Bonnefon and Daviet, "Quartic formulation of Coulomb 3D frictional contact", INRIA RT-0400, 2011.
+//! Before each sweep the rows of a leg that stick, contact and dry friction, are solved at once (block Gauss-Seidel).
 //!
 //! With the factors of [`super::dynamics`] the Delassus matrix is J M^-1 J^T = W W^T + (within a leg) U U^T with W =
 //! (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so the cost

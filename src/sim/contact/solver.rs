@@ -4,11 +4,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::ContactPoint;
 use super::law::{LocalProblem, into_cone};
-use crate::robot::{JOINTS, Joints, LEGS};
+use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
-use crate::sim::dynamics::{Dynamics, Six, add_scaled, dot};
+use crate::sim::dynamics::Dynamics;
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
 use crate::sim::quantities::stack;
+use crate::sim::six::{Cholesky6, Six, add_scaled, dot};
 use crate::sim::terrain::LooseBlock;
 
 /// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
@@ -179,7 +180,7 @@ impl ContactSolver {
         }
         // W = (J_0 - J_l G) L^-T
         for row in &mut trunk_rows {
-            step.dynamics.solve_lower(row);
+            step.dynamics.factor.solve_lower(row);
         }
         let [w1, w2, w3] = &trunk_rows;
         let (a12, a13, a23) = (dot(w1, w2), dot(w1, w3), dot(w2, w3));
@@ -261,7 +262,7 @@ impl ContactSolver {
         u[part] = sign;
         let l = &step.legs[leg];
         let mut trunk_row = l.gain[part].map(|g| -sign * g);
-        step.dynamics.solve_lower(&mut trunk_row);
+        step.dynamics.factor.solve_lower(&mut trunk_row);
         let leg_row = l.factor_inverse * u;
         let delassus = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
         let [lowest, highest] = bounds;
@@ -279,6 +280,17 @@ impl ContactSolver {
         });
     }
 
+    /// Returns the legs that have dry friction, each with its first contact on ground that does not move.
+    fn sticking_legs(&self) -> PerLeg<Option<StickingLeg>> {
+        std::array::from_fn(|leg| {
+            let is_own = |contact: &ContactConstraint| contact.leg == leg && contact.on_block.is_none();
+            let contact = self.contacts.iter().position(is_own)?;
+            let row = |part| self.joint_rows.iter().position(|row| row.friction_of == Some(3 * leg + part));
+            let rows = [row(0)?, row(1)?, row(2)?];
+            Some(StickingLeg { contact, rows, sticks: [false; 3], factor: Cholesky6::IDENTITY })
+        })
+    }
+
     /// Solves for all impulses; returns the change of velocity that they make.
     pub fn solve(&mut self, dynamics: &Dynamics, world_from_body: &Matrix3<f64>) -> GeneralizedVelocity {
         let mut sums = ImpulseSums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
@@ -291,18 +303,21 @@ impl ContactSolver {
         for row in &self.joint_rows {
             row.add(&mut sums, row.impulse);
         }
+        let mut sticking_legs = self.sticking_legs();
         for sweep in 0..self.config.max_sweeps {
             if sweep < FLOOR_SWEEPS {
                 self.loose_blocks.iter_mut().for_each(LooseBlock::limit_floor_friction);
             }
             let mut change: f64 = 0.0;
+            for leg in sticking_legs.iter_mut().flatten() {
+                leg.solve(&mut self.contacts, &mut self.joint_rows, &mut sums);
+            }
             for contact in &mut self.contacts {
                 let on_block = contact.on_block.map(|i| &mut self.on_blocks[i]);
                 change = change.max(contact.solve(&mut sums, on_block, &mut self.loose_blocks));
             }
             for row in &mut self.joint_rows {
-                let velocity = row.rhs + dot(&row.trunk_row, &sums.trunk) + row.leg_row.dot(&sums.legs[row.leg]);
-                let impulse = (row.impulse - velocity / row.delassus).clamp(row.lowest, row.highest);
+                let impulse = (row.impulse - row.velocity(&sums) / row.delassus).clamp(row.lowest, row.highest);
                 let step = impulse - row.impulse;
                 row.impulse = impulse;
                 row.add(&mut sums, step);
@@ -327,7 +342,7 @@ impl ContactSolver {
         }
         // dv_0 = L^-T y_0,  ddq_l = C^-T y_l - G dv_0
         let mut trunk = sums.trunk;
-        dynamics.solve_upper(&mut trunk);
+        dynamics.factor.solve_upper(&mut trunk);
         let [fr, fl, rr, rl, _] = sums.legs;
         let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         GeneralizedVelocity { trunk, legs }
@@ -341,6 +356,12 @@ struct ImpulseSums {
 }
 
 impl JointConstraint {
+    /// Velocity less the velocity that may remain.
+    #[inline]
+    fn velocity(&self, sums: &ImpulseSums) -> f64 {
+        self.rhs + dot(&self.trunk_row, &sums.trunk) + self.leg_row.dot(&sums.legs[self.leg])
+    }
+
     /// Adds the impulse `p` to the sums.
     #[inline]
     fn add(&self, sums: &mut ImpulseSums, p: f64) {
@@ -405,6 +426,71 @@ impl ContactConstraint {
     pub fn normal_impulse(&self) -> f64 {
         self.impulse.x
     }
+}
+
+/// A leg with a contact and dry friction in its joints. While the contact and at least one joint stick, their rows are solved at once:
+/// a leg is light beside the trunk, and one row after the other such rows take dozens of sweeps to agree.
+struct StickingLeg {
+    /// Index of its contact.
+    contact: usize,
+    /// Indices of the friction rows of its joints.
+    rows: [usize; 3],
+    /// Which of these rows stick: their impulses are within the bounds.
+    sticks: [bool; 3],
+    /// Factor of the Delassus matrix of the contact and the rows that stick; 1 on the diagonal for the others.
+    factor: Cholesky6,
+}
+
+impl StickingLeg {
+    /// Takes the velocities of the rows that stick to zero. Changes nothing if that takes an impulse out of its bounds: the sweep
+    /// finds out what slides.
+    fn solve(
+        &mut self,
+        contacts: &mut [ContactConstraint],
+        joint_rows: &mut [JointConstraint],
+        sums: &mut ImpulseSums,
+    ) {
+        let contact = &mut contacts[self.contact];
+        let rows = self.rows.map(|row| joint_rows[row]);
+        let sticks = rows.each_ref().map(|row| row.lowest < row.impulse && row.impulse < row.highest);
+        if sticks == [false; 3] || contact.impulse.x <= 0.0 || !contact.local.holds(&contact.impulse) {
+            return;
+        }
+        if sticks != self.sticks {
+            self.sticks = sticks;
+            self.factor = Cholesky6::new(sticking_delassus(contact, &rows, &sticks));
+        }
+        let v = contact.velocity(sums);
+        let row_velocity = |i: usize| if sticks[i] { -rows[i].velocity(sums) } else { 0.0 };
+        let mut step = [-v.x, -v.y, -v.z, row_velocity(0), row_velocity(1), row_velocity(2)];
+        self.factor.solve_lower(&mut step);
+        self.factor.solve_upper(&mut step);
+        let contact_step = Vector3::new(step[0], step[1], step[2]);
+        let within = |(row, step): (&JointConstraint, &f64)| (row.lowest..=row.highest).contains(&(row.impulse + step));
+        if !contact.local.holds(&(contact.impulse + contact_step)) || !rows.iter().zip(&step[3..]).all(within) {
+            return;
+        }
+        contact.impulse += contact_step;
+        contact.add(sums, &contact_step);
+        for (row, step) in self.rows.iter().zip(&step[3..]) {
+            joint_rows[*row].impulse += step;
+            joint_rows[*row].add(sums, *step);
+        }
+    }
+}
+
+/// Delassus matrix of a contact and the friction rows of its leg that stick, lower triangle by columns; 1 on the diagonal of the others.
+fn sticking_delassus(contact: &ContactConstraint, rows: &[JointConstraint; 3], sticks: &[bool; 3]) -> [Six; 6] {
+    let ([w1, w2, w3], u) = (contact.trunk_rows, contact.leg_rows.transpose());
+    let trunk_rows = [w1, w2, w3, rows[0].trunk_row, rows[1].trunk_row, rows[2].trunk_row];
+    let leg_rows: [Vector3<f64>; 6] =
+        [u.column(0).into(), u.column(1).into(), u.column(2).into(), rows[0].leg_row, rows[1].leg_row, rows[2].leg_row];
+    let is_in = |row: usize| row < 3 || sticks[row - 3];
+    let element = |i: usize, j: usize| match i >= j && is_in(i) && is_in(j) {
+        true => dot(&trunk_rows[i], &trunk_rows[j]) + leg_rows[i].dot(&leg_rows[j]),
+        false => f64::from(i == j),
+    };
+    std::array::from_fn(|j| std::array::from_fn(|i| element(i, j)))
 }
 
 /// Returns the normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1),

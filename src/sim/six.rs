@@ -1,0 +1,82 @@
+//! Vectors and symmetric matrices of six: velocities of the trunk, the rows of a leg.
+
+/// A six-vector. A plain array, which the compiler vectorizes.
+pub(super) type Six = [f64; 6];
+
+/// a . b
+#[inline]
+pub(super) fn dot(a: &Six, b: &Six) -> f64 {
+    (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
+}
+
+/// y += s x
+#[inline]
+pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += s * x;
+    }
+}
+
+/// L of a symmetric positive matrix A = L L^T.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cholesky6 {
+    /// L by columns; those above the diagonal are undefined.
+    columns: [Six; 6],
+    diagonal_inverse: Six,
+}
+
+impl Cholesky6 {
+    /// Factor of the identity.
+    pub const IDENTITY: Cholesky6 = Cholesky6 {
+        columns: [
+            [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        ],
+        diagonal_inverse: [1.0; 6],
+    };
+
+    /// Factors a matrix of which only the lower triangle, by columns, is used.
+    #[inline]
+    pub fn new(mut a: [Six; 6]) -> Cholesky6 {
+        let mut diagonal_inverse = [0.0; 6];
+        for j in 0..6 {
+            let d = 1.0 / a[j][j].sqrt();
+            diagonal_inverse[j] = d;
+            for x in &mut a[j][j..] {
+                *x *= d;
+            }
+            for k in j + 1..6 {
+                for i in k..6 {
+                    a[k][i] -= a[j][i] * a[j][k];
+                }
+            }
+        }
+        Cholesky6 { columns: a, diagonal_inverse }
+    }
+
+    /// Replaces x by L^-1 x.
+    #[inline]
+    pub fn solve_lower(&self, x: &mut Six) {
+        for j in 0..6 {
+            x[j] *= self.diagonal_inverse[j];
+            for i in j + 1..6 {
+                x[i] -= self.columns[j][i] * x[j];
+            }
+        }
+    }
+
+    /// Replaces x by L^-T x.
+    #[inline]
+    pub fn solve_upper(&self, x: &mut Six) {
+        for j in (0..6).rev() {
+            for i in j + 1..6 {
+                x[j] -= self.columns[j][i] * x[i];
+            }
+            x[j] *= self.diagonal_inverse[j];
+        }
+    }
+}
