@@ -91,6 +91,7 @@ impl Actuator {
         let full = self.config.hardware_like.full_torque_speed_share;
         let share = ((1.0 - dq.abs() / self.limits.max_velocity[joint]) / (1.0 - full)).clamp(0.0, 1.0);
         let most = share * self.limits.max_torque[joint];
-        torque.clamp(-most, most)
+        // `clamp` would panic where the velocity is not finite, which the control has yet to find in the state.
+        torque.min(most).max(-most)
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{GRAVITY, JointCommand, Placement, Robot, RobotState};
-use quadfrog::sim::{ActuatorKind, SimConfig, SimError, SimState, Simulator};
+use quadfrog::sim::{ActuatorKind, SimConfig, SimError, SimState, Simulator, TerrainKind};
 
 fn go1() -> RobotDescription {
     RobotDescription::embedded("go1").unwrap()
@@ -189,6 +189,24 @@ fn a_motor_holds_its_position() {
     }
     let q = simulator.state().joint_position;
     assert!((q[1] - 1.5).abs() < 0.01 && (q[2] + 1.0).abs() < 0.01, "{q:?}");
+}
+
+/// Regression: the torque-speed curve panicked at a velocity that is no number. The control finds such a state itself.
+#[test]
+fn a_state_that_is_not_finite_is_reported() {
+    for kind in [TerrainKind::Flat, TerrainKind::Steps, TerrainKind::Blocks] {
+        for value in [f64::NAN, f64::INFINITY] {
+            let mut config = hardware_like();
+            config.terrain.kind = kind;
+            config.terrain.blocks.loose = true;
+            let mut simulator = Simulator::new(&go1(), &config).unwrap();
+            simulator.set_state(&SimState { joint_velocity: [value; 12], ..SimState::default() });
+            for _ in 0..20 {
+                simulator.write(&JointCommand::damping(2.0)).unwrap();
+            }
+            assert!(!simulator.read().unwrap().joint_velocity_rad_s[0].is_finite());
+        }
+    }
 }
 
 #[test]
