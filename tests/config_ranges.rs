@@ -1,9 +1,13 @@
 //! Ranges of every number of the shipped files: what is accepted runs, what no robot may be limited by is refused on
 //! hardware with file, key, value, range and remedy.
 
+#[path = "support/cores.rs"]
+mod cores;
+
 use std::fs;
 use std::path::Path;
 
+use cores::on_all_cores;
 use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, EngineError, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
@@ -91,22 +95,21 @@ fn trial(config: &Config, robot: &RobotDescription) -> Option<(TrialEnd, Vec<Tic
 }
 
 /// Loads every mutant of a file and tries those that are accepted; at least the text and the list are not.
-fn every_mutant(file: &str, text: &str, accepted: impl Fn(&Config)) {
+fn every_mutant(file: &str, text: &str, accepted: impl Fn(&Config) + Sync) {
     accepted(&load(file, text).unwrap());
-    let (mut tried, mut refused) = (0, 0);
-    for (mutation, text) in mutants(text) {
-        match load(file, &text) {
-            Err(error) => {
-                refused += 1;
-                assert!(error.to_string().contains(file), "{mutation}: {error}");
-            }
-            Ok(config) => {
-                tried += 1;
-                println!("{file}: {mutation} is accepted");
-                accepted(&config);
-            }
+    let is_accepted = on_all_cores(&mutants(text), |(mutation, text)| match load(file, text) {
+        Err(error) => {
+            assert!(error.to_string().contains(file), "{mutation}: {error}");
+            false
         }
-    }
+        Ok(config) => {
+            println!("{file}: {mutation} is accepted");
+            accepted(&config);
+            true
+        }
+    });
+    let tried = is_accepted.iter().filter(|is_accepted| **is_accepted).count();
+    let refused = is_accepted.len() - tried;
     println!("{file}: {tried} tried, {refused} refused");
     assert!(tried > 0 && refused > tried, "{tried} tried, {refused} refused");
 }

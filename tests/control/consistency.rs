@@ -2,6 +2,7 @@
 //! not armed, or damped while they are energised. Stepped by hand, so that times are numbers of ticks.
 
 use crate::bench;
+use crate::cores::on_all_cores;
 use crate::go1;
 use bench::{Bench, shipped};
 use go1::pair;
@@ -211,9 +212,9 @@ fn jumps_without_alarm(world: World, count: u32) {
 #[test]
 fn sound_robots_jump_without_alarm() {
     let count = std::env::var("JUMPS").ok().and_then(|count| count.parse().ok()).unwrap_or(20);
-    for world in [World::Ideal, World::HardwareLike, World::Rough, World::Delayed] {
-        jumps_without_alarm(world, count);
-    }
+    on_all_cores(&[World::Ideal, World::HardwareLike, World::Rough, World::Delayed], |world| {
+        jumps_without_alarm(*world, count);
+    });
 }
 
 /// Faults of a robot that lies disarmed, and the check that refuses arming.

@@ -2,6 +2,8 @@
 
 #[path = "../support/bench.rs"]
 mod bench;
+#[path = "../support/cores.rs"]
+mod cores;
 #[path = "../support/emulated.rs"]
 mod emulated;
 #[path = "../support/go1.rs"]
