@@ -139,39 +139,19 @@ impl Study {
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
     ) -> Result<u32, StudyError> {
-        self.begin_if(draft, overrides, attributes, |_| true)
+        self.begin_if(draft, overrides, attributes, TrialState::Running, |_| true)
     }
 
     /// [`Study::begin`] if `room`, called with all trials while the journal is locked, returns true: workers on a shared
-    /// journal keep a common budget exactly. [`StudyError::Full`] if it returns false.
+    /// journal keep a common budget exactly. [`StudyError::Full`] if it returns false. The trial has `state` from then on: a
+    /// trial that is not run has failed already, in the same commit.
     pub fn begin_if(
         &mut self,
         draft: &TrialDraft,
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
-        room: impl Fn(&[Trial]) -> bool,
-    ) -> Result<u32, StudyError> {
-        self.begin_as(draft, overrides, attributes, room, TrialState::Running)
-    }
-
-    /// [`Study::begin_if`] of a trial that is not run: it has failed already, in the same commit.
-    pub fn begin_skipped(
-        &mut self,
-        draft: &TrialDraft,
-        overrides: &[(String, f64)],
-        attributes: &[(String, Value)],
-        room: impl Fn(&[Trial]) -> bool,
-    ) -> Result<u32, StudyError> {
-        self.begin_as(draft, overrides, attributes, room, TrialState::Fail)
-    }
-
-    fn begin_as(
-        &mut self,
-        draft: &TrialDraft,
-        overrides: &[(String, f64)],
-        attributes: &[(String, Value)],
-        room: impl Fn(&[Trial]) -> bool,
         state: TrialState,
+        room: impl Fn(&[Trial]) -> bool,
     ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };

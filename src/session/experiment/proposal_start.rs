@@ -11,7 +11,7 @@ use super::search::SearchSettings;
 use super::trial_changes::must_be_within;
 use super::{Experiment, ExperimentState, queue};
 use crate::optimize::study::{Study, StudyError, TellOutcome};
-use crate::optimize::trial::Trial;
+use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::Record;
 use crate::telemetry::TrialSpec;
 use crate::trial::{
@@ -179,12 +179,14 @@ impl Experiment {
         let verdict = skipped.is_some().then_some(Verdict::Void);
         let judged = TrialRecord { verdict, cause: skipped.unwrap_or_default(), ..TrialRecord::default() };
         let mut attributes = attributes::write(&began);
-        let begun = if verdict.is_some() {
-            attributes.extend(attributes::write(&JudgedAttributes::of(&judged, false)));
-            self.study.begin_skipped(&draft, &overrides, &attributes, room)
-        } else {
-            self.study.begin_if(&draft, &overrides, &attributes, room)
+        let state = match verdict {
+            Some(_) => {
+                attributes.extend(attributes::write(&JudgedAttributes::of(&judged, false)));
+                TrialState::Fail
+            }
+            None => TrialState::Running,
         };
+        let begun = self.study.begin_if(&draft, &overrides, &attributes, state, room);
         let number = match begun {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {
