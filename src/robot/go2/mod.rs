@@ -1,6 +1,6 @@
 //! The Unitree Go2: [`message`] defines its DDS messages as bytes, [`convert`] their meaning, [`handover`] the way from the robot's
 //! own controller to this program, [`link`] the robot behind a transport. They know no DDS library; with the feature `go2`
-//! [`dds`] carries the bytes.
+//! the module `dds` carries the bytes.
 //!
 //! `robots/go2/README.md` lists the known and unknown properties of the robot with their sources.
 
