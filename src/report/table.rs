@@ -107,7 +107,7 @@ pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInf
         let measured = row.measured.as_ref();
         let numbers = [row.value, measured.map(|measured| measured.apex_m), measured.map(|measured| measured.air_s)];
         cells.extend(numbers.map(|number| number.map_or_else(|| "-".into(), |number| format!("{number:.3}"))));
-        cells.extend([row.source.name().into(), verdict(row)]);
+        cells.extend([row.origin(), verdict(row)]);
         lines.push(cells);
     }
     aligned(&lines, |column| column + 2 >= columns)

@@ -58,10 +58,9 @@ impl TrialRecord {
         self.verdict == Some(Verdict::Void) && refused
     }
 
-    /// Returns the origin of its parameters in words, with the trial that it repeats.
+    /// Returns the origin of its parameters in words, with the trial that it repeats: `re-run of #3`.
     pub fn origin(&self) -> String {
-        let parent = self.parent.map_or(String::new(), |parent| format!(" {parent}"));
-        format!("{}{parent}", self.source.name())
+        self.source.with_parent(self.parent)
     }
 
     /// Returns in words the gains that differ from the configured ones; empty where none does.

@@ -3,6 +3,7 @@
 use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, Transition};
+use quadfrog::report::table;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{
@@ -13,6 +14,7 @@ use quadfrog::trial::{
     Verdict,
 };
 use quadfrog_console::message::{Msg, ReplayStatus};
+use quadfrog_console::text::as_text;
 use quadfrog_console::theme::Role;
 
 fn at_time(console: &mut Console, time_s: u64) {
@@ -346,7 +348,26 @@ fn the_source_of_a_repeat_is_whole() {
     console.press(&["2"]);
     for (columns, rows) in [(120, 40), (200, 60)] {
         let screen = console.screen(columns, rows);
-        assert_shows(&screen, &["confirm 123", "re-run 123"]);
+        assert_shows(&screen, &["confirm of #123", "re-run of #123"]);
+    }
+}
+
+/// Regression: the tables said `re-run 123`, the details and the proposal `re-run of #123`, `quadfrog study show` `re-run`.
+#[test]
+fn the_source_of_a_repeat_reads_the_same_everywhere() {
+    let mut console = Console::ready();
+    let row =
+        TrialRecord { source: ProposalSource::Rerun, parent: Some(123), ..trial(124, Some(Verdict::Accept), None) };
+    console.record(Record::Trial(row.clone()));
+    console.press(&["2"]);
+    let table = console.screen(200, 60);
+    console.press(&["Enter"]);
+    let details = console.screen(80, 24);
+    console.press(&["Esc", "R"]);
+    let report = console.screen(200, 60);
+    let shown = table::table(std::slice::from_ref(&row), None, &[], "m");
+    for text in [table, details, report, shown, as_text(&row, &console.model)] {
+        assert_shows(&text, &["re-run of #123"]);
     }
 }
 

@@ -31,7 +31,7 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     if let Some(value) = session.measured_objective(trial) {
         row("measured", format!("{value:.4} {unit}"));
     }
-    row("source", trial.source.with_parent(trial.parent));
+    row("source", trial.origin());
     row("attempt", session.trials.attempt(trial).to_string());
     if let Some(repeats) = points::repeats_of(session, theme, trial.trial) {
         row("repeats", repeats);
