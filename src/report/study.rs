@@ -30,7 +30,7 @@ pub struct ReportedStudy {
     pub f1_hz: f64,
     /// Parameters with their bounds.
     pub parameters: Vec<ParameterInfo>,
-    /// Trials by number.
+    /// Trials by number, and the proposals that were not run.
     pub rows: Vec<TrialRecord>,
     /// Number of the best trial.
     pub best: Option<u32>,
@@ -76,9 +76,14 @@ impl ReportedStudy {
         self.recordings.trials.get(&trial)
     }
 
+    /// Trials without the proposals that were not run.
+    pub fn trials(&self) -> impl Iterator<Item = &TrialRecord> {
+        self.rows.iter().filter(|row| !row.was_not_run())
+    }
+
     /// Trials that ran and have that verdict.
     pub fn with(&self, verdict: Verdict) -> impl Iterator<Item = &TrialRecord> {
-        self.rows.iter().filter(move |row| row.verdict == Some(verdict) && !row.was_not_run())
+        self.trials().filter(move |row| row.verdict == Some(verdict))
     }
 
     /// Trials that count.

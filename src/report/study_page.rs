@@ -144,7 +144,8 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
     let [without_jump, missing] = [without_jump, missing]
         .map(|trials| trials.iter().map(u32::to_string).collect::<Vec<_>>())
         .map(|trials| trials.join(", "));
-    let recorded = study.rows.iter().filter(|row| study.has_ticks_of(row.trial)).count();
+    let recorded = study.trials().filter(|row| study.has_ticks_of(row.trial)).count();
+    let trials = study.trials().count();
     let end = match without_jump.as_str() {
         "" => String::new(),
         trials => format!(" Trial {trials} ended before the impulse: there is no jump to draw."),
@@ -153,12 +154,10 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
         (true, _) => "No recording of this study exists: motion, torque and power cannot be drawn. `quadfrog optimize \
                       --record all` and the console record ticks."
             .to_owned(),
-        (false, 0) => format!("Ticks of {recorded} of {} trials are recorded.", study.rows.len()),
+        (false, 0) => format!("Ticks of {recorded} of {trials} trials are recorded."),
         (false, _) => format!(
-            "Ticks of {recorded} of {} trials are recorded; those of trial {} are missing: its motion, torque and power \
-             cannot be drawn. `quadfrog optimize --record all` and the console record the ticks of every trial.",
-            study.rows.len(),
-            missing
+            "Ticks of {recorded} of {trials} trials are recorded; those of trial {missing} are missing: its motion, torque \
+             and power cannot be drawn. `quadfrog optimize --record all` and the console record the ticks of every trial."
         ),
     };
     text + &end

@@ -40,7 +40,7 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
         let best = study.best_row();
         let cells = [
             Cell::text(format!("{}, {}", title(study), study.robot)),
-            Cell::count(study.rows.iter().filter(|row| !row.was_not_run()).count()),
+            Cell::count(study.trials().count()),
             counted(Verdict::Accept),
             counted(Verdict::Fall),
             Cell::count(repeats.count()),

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::program::{Program, assert_shows, counted_trials, hold};
+use crate::pty::Session;
 use crate::skip::skip;
 use serde_json::Value;
 
@@ -373,4 +374,33 @@ fn fixed_parameters_and_a_confirmation_are_shown_as_sentences() {
     for raw in ["confirm:", "confirmed:", "fixed:", "model_best", "none"] {
         assert!(!shown.contains(raw), "{raw}:\n{shown}");
     }
+}
+
+/// Regression: the list of the studies counted a skipped proposal as a trial, the report did not.
+#[test]
+fn a_proposal_that_was_not_run_is_no_trial_in_the_list_and_in_the_report() {
+    let program = Program::new();
+    fs::create_dir(program.path("recordings")).unwrap();
+    let mut session = Session::start(&program.path("recordings"), (100, 30), &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("n");
+    session.wait_for(&["Press y to skip trial #0"]);
+    session.send("y");
+    session.wait_for(&["Trial #1"]);
+    session.quit();
+    let study = program.study("recordings");
+    let study = study.to_str().unwrap();
+    program.text(&["optimize", "--resume", study, "--trials", "3", "--record", "all"]);
+    assert_shows(&program.text(&["study", "show", study]), &["not run: skipped before the jump"]);
+    let list = program.text(&["study", "list"]);
+    let cells: Vec<&str> = list.lines().nth(1).unwrap().split_whitespace().collect();
+    // Trials, and those that count.
+    assert_eq!(cells[3..5], ["3", "3"], "{list}");
+    let report = program.text(&["report", study]);
+    assert_shows(&report, &["Ticks of 3 of 3 trials are recorded"]);
+    let page: Value = serde_json::from_str(&program.text(&["report", "--json", study])).unwrap();
+    let blocks = page["sections"].as_array().unwrap().iter().flat_map(|section| section["blocks"].as_array().unwrap());
+    let tables: Vec<&Value> = blocks.filter_map(|block| block.get("table")).collect();
+    let studies = tables.iter().find(|table| table["caption"].as_str().unwrap().starts_with("Studies.")).unwrap();
+    assert_eq!(studies["rows"][0][1], 3, "{studies}");
 }

@@ -163,6 +163,7 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
     let trials = opened.study.trials();
     let all = opened.rows();
+    let ran = all.iter().filter(|row| !row.was_not_run()).count();
     let counted = all.iter().filter(|row| row.counts()).count();
     let falls = trials.iter().filter(|trial| trial.is_fall()).count();
     let best = opened.best(&all).and_then(|row| row.value);
@@ -170,7 +171,7 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
         file.parent().unwrap_or(file).display().to_string(),
         stored.task.name().to_owned(),
         stored.seed.to_string(),
-        trials.len().to_string(),
+        ran.to_string(),
         counted.to_string(),
         falls.to_string(),
         best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit())),
