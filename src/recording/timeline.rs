@@ -202,15 +202,10 @@ impl Timeline {
                     continue;
                 };
                 let span = &mut spans[index];
-                let ends = match &event.record {
-                    Record::Transition(change) if change.to == Mode::Jump => {
-                        span.impulse_ns.get_or_insert(time_ns);
-                        false
-                    }
-                    Record::Stage(stage) => stage.stage == ExperimentStage::Review && stage.trial == span.trial,
-                    Record::Trial(row) => row.trial == span.trial && row.suggested.is_some(),
-                    _ => false,
-                };
+                if matches!(&event.record, Record::Transition(change) if change.to == Mode::Jump) {
+                    span.impulse_ns.get_or_insert(time_ns);
+                }
+                let ends = ended_trial(&event.record) == Some(span.trial);
                 if ends && !std::mem::replace(&mut ended[index], true) {
                     span.end_ns = time_ns;
                 }
@@ -353,6 +348,15 @@ fn begin_utc_ns(player: &Player) -> u64 {
 /// Returns the name that a recording has once it is finished.
 fn finished_name(path: &Path) -> PathBuf {
     if path.extension().is_some_and(|end| end == "part") { path.with_extension("") } else { path.into() }
+}
+
+/// Returns the trial whose end a record reports: its review, or its row with a suggested verdict.
+pub fn ended_trial(record: &Record) -> Option<u32> {
+    match record {
+        Record::Stage(stage) => (stage.stage == ExperimentStage::Review).then_some(stage.trial),
+        Record::Trial(row) => row.suggested.map(|_| row.trial),
+        _ => None,
+    }
 }
 
 fn trial_begin(marker: &Marker) -> Option<(u32, u64)> {

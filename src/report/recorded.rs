@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use super::jump::{JumpCurves, JumpQuantities};
 use crate::recording::player::{Played, Player};
+use crate::recording::record::Stamped;
+use crate::recording::timeline::ended_trial;
 use crate::robot::description::RobotDescription;
 use crate::telemetry::Tick;
 
@@ -35,6 +37,8 @@ pub struct Recordings {
     pub trials: BTreeMap<u32, RecordedTrial>,
     /// Trials of which ticks are recorded, also those that ended before the impulse.
     pub with_ticks: BTreeSet<u32>,
+    /// Those of them whose ticks are not whole: the program was killed in the trial, or a part of the file is lost.
+    pub in_part: BTreeSet<u32>,
     /// Recordings that were read.
     pub files: Vec<PathBuf>,
     /// Versions of quadfrog that wrote them, each with its commit.
@@ -61,22 +65,37 @@ impl Recordings {
         self.programs.insert(player.session().program_version());
         self.with_ticks.extend(player.trials_with_ticks());
         let mut ticks: Vec<Tick> = Vec::new();
+        let mut last_ended = None;
         for played in player.by_ref() {
-            let Played::Tick(tick) = played else { continue };
+            let tick = match played {
+                Played::Tick(tick) => tick,
+                Played::Record(Stamped { record, .. }) => {
+                    last_ended = ended_trial(&record).or(last_ended);
+                    continue;
+                }
+            };
             if ticks.last().is_some_and(|last| last.trial != tick.trial) {
-                self.end(&mut ticks, robot);
+                self.end(&mut ticks, robot, true);
             }
             if tick.trial.is_some() {
                 ticks.push(*tick);
             }
         }
-        self.end(&mut ticks, robot);
+        let is_ended = ticks.last().is_some_and(|last| last.trial == last_ended);
+        self.end(&mut ticks, robot, is_ended);
         self.damages.extend(player.damage());
     }
 
-    fn end(&mut self, ticks: &mut Vec<Tick>, robot: &RobotDescription) {
-        let trial = ticks.last().and_then(|tick| tick.trial).zip(RecordedTrial::of(ticks, robot));
-        self.trials.extend(trial);
+    /// Takes over the ticks of a trial; `is_ended`: the recording goes on after them or reports the trial's end.
+    fn end(&mut self, ticks: &mut Vec<Tick>, robot: &RobotDescription, is_ended: bool) {
+        if let Some(trial) = ticks.last().and_then(|tick| tick.trial) {
+            let is_whole = is_ended && ticks.windows(2).all(|pair| pair[1].number == pair[0].number + 1);
+            match is_whole {
+                true => self.in_part.remove(&trial),
+                false => self.in_part.insert(trial),
+            };
+            self.trials.extend(RecordedTrial::of(ticks, robot).map(|recorded| (trial, recorded)));
+        }
         ticks.clear();
     }
 }

@@ -71,6 +71,15 @@ impl ReportedStudy {
         self.recorded(trial).is_some() || self.recordings.with_ticks.contains(&trial)
     }
 
+    /// Returns in words whether the ticks of a trial are recorded.
+    pub fn ticks_of(&self, trial: u32) -> &'static str {
+        match self.has_ticks_of(trial) {
+            true if self.recordings.in_part.contains(&trial) => "in part",
+            true => "yes",
+            false => "no",
+        }
+    }
+
     /// A trial's jump, if its ticks were recorded.
     pub fn recorded(&self, trial: u32) -> Option<&RecordedTrial> {
         self.recordings.trials.get(&trial)

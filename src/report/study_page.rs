@@ -141,23 +141,25 @@ fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
 fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
     let without_curves = trials.iter().filter(|trial| trial.curves.is_none()).map(|trial| trial.row.trial);
     let (without_jump, missing): (Vec<u32>, Vec<u32>) = without_curves.partition(|trial| study.has_ticks_of(*trial));
-    let [without_jump, missing] = [without_jump, missing]
-        .map(|trials| trials.iter().map(u32::to_string).collect::<Vec<_>>())
+    let in_part = study.trials().map(|row| row.trial).filter(|trial| study.recordings.in_part.contains(trial));
+    let [without_jump, missing, in_part] = [without_jump, missing, in_part.collect()]
+        .map(|trials: Vec<u32>| trials.iter().map(u32::to_string).collect::<Vec<_>>())
         .map(|trials| trials.join(", "));
     let recorded = study.trials().filter(|row| study.has_ticks_of(row.trial)).count();
-    let trials = study.trials().count();
+    let in_part = if in_part.is_empty() { String::new() } else { format!(", of trial {in_part} in part") };
+    let recorded = format!("Ticks of {recorded} of {} trials are recorded{in_part}", study.trials().count());
     let end = match without_jump.as_str() {
         "" => String::new(),
-        trials => format!(" Trial {trials} ended before the impulse: there is no jump to draw."),
+        trials => format!(" The ticks of trial {trials} end before the impulse: there is no jump to draw."),
     };
     let text = match (study.recordings.files.is_empty(), missing.len()) {
         (true, _) => "No recording of this study exists: motion, torque and power cannot be drawn. `quadfrog optimize \
                       --record all` and the console record ticks."
             .to_owned(),
-        (false, 0) => format!("Ticks of {recorded} of {trials} trials are recorded."),
+        (false, 0) => format!("{recorded}."),
         (false, _) => format!(
-            "Ticks of {recorded} of {trials} trials are recorded; those of trial {missing} are missing: its motion, torque \
-             and power cannot be drawn. `quadfrog optimize --record all` and the console record the ticks of every trial."
+            "{recorded}; those of trial {missing} are missing: its motion, torque and power cannot be drawn. `quadfrog \
+             optimize --record all` and the console record the ticks of every trial."
         ),
     };
     text + &end

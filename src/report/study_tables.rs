@@ -238,7 +238,6 @@ pub fn trials(study: &ReportedStudy) -> Table {
     let columns = columns.chain(known.then(|| Column::text("ticks")));
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
-        let ticks = if study.has_ticks_of(row.trial) { "yes" } else { "no" };
         let mut verdict = row.verdict_name().unwrap_or("not judged").to_owned();
         for (holds, text) in [(row.counts_by_hand(), ", J by hand"), (study.best == Some(row.trial), ", best")] {
             verdict += if holds { text } else { "" };
@@ -249,7 +248,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
         let cells = cells.chain(expected.map(|(value, digits)| Cell::optional(value, digits)));
         let cells = cells.chain([Cell::optional(row.value, 3)]).chain(measured(row));
         let texts = [Cell::text(verdict), Cell::text(row.origin())];
-        table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(ticks))).collect());
+        table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(study.ticks_of(row.trial)))).collect());
     }
     table
 }

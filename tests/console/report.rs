@@ -235,6 +235,7 @@ fn trials_without_ticks_are_named() {
 #[test]
 fn a_recording_that_was_cut_off_is_used_and_reported() {
     let (program, study) = study(&[]);
+    assert_eq!(column(table(&page(&program, &[&study]), "Trials of"), "ticks"), ["yes"; 5]);
     let whole = Path::new(&study).join("session.mcap");
     let bytes = fs::read(&whole).unwrap();
     fs::write(whole.with_extension("mcap.part"), &bytes[..bytes.len() * 2 / 3]).unwrap();
@@ -243,7 +244,11 @@ fn a_recording_that_was_cut_off_is_used_and_reported() {
     let ticks = column(table(&page, "Trials of"), "ticks");
     assert_eq!(ticks[0], "yes");
     assert_eq!(ticks[4], "no");
+    // Regression: the trial in which the recording ends had ticks like any other.
+    let last = ticks.iter().rposition(|ticks| ticks != "no").unwrap();
+    assert!(ticks[..last].iter().all(|ticks| ticks == "yes") && ticks[last] == "in part", "{ticks:?}");
     let paragraphs: Vec<&str> = blocks(&page, "paragraph").iter().map(|text| text.as_str().unwrap()).collect();
+    assert!(paragraphs.iter().any(|text| text.contains(&format!(", of trial {last} in part"))), "{paragraphs:?}");
     assert!(
         paragraphs.iter().any(|text| text.contains("session.mcap.part") && text.contains("cut off")),
         "{paragraphs:?}"

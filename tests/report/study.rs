@@ -178,5 +178,11 @@ fn a_page_of_a_study_names_missing_ticks_and_draws_the_others() {
     let page = study_page::page(std::slice::from_ref(&study), &choices, "0.1.0 (test)");
     let shown = text::render(&page, 80).replace('\n', " ");
     assert!(shown.contains("Ticks of 2 of 6 trials are recorded"), "{shown}");
-    assert!(shown.contains("Trial 0 ended before the impulse"), "{shown}");
+    assert!(shown.contains("The ticks of trial 0 end before the impulse"), "{shown}");
+    // Regression: a trial in which the program was killed had ticks like any other.
+    study.recordings.in_part.insert(0);
+    let page = study_page::page(std::slice::from_ref(&study), &choices, "0.1.0 (test)");
+    let shown = text::render(&page, 80).replace('\n', " ");
+    assert!(shown.contains("Ticks of 2 of 6 trials are recorded, of trial 0 in part"), "{shown}");
+    assert_eq!([0, 1, 2].map(|trial| study.ticks_of(trial)), ["in part", "yes", "no"]);
 }
