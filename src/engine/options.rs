@@ -1,6 +1,6 @@
 //! Settings and errors of an engine's start.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::config::{Config, ConfigError};
@@ -127,6 +127,8 @@ pub enum EngineError {
     Unattended,
     #[error("{}: there is no such journal; give a study's folder, its study.log, a journal file or redis://HOST:PORT/DB", file.display())]
     NoJournal { file: PathBuf },
+    #[error("{}: this folder holds no study{}", folder.display(), in_folders(folder, *below))]
+    NoStudyInFolder { folder: PathBuf, below: usize },
     #[error("{journal}: several studies are in it; choose one with --name: {names}")]
     WhichStudy { journal: String, names: String },
     #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; its studies: {names}") })]
@@ -153,6 +155,15 @@ pub enum EngineError {
     NoPrior,
     #[error("{what}: {source}")]
     System { what: String, source: std::io::Error },
+}
+
+/// Returns the way to a study from a folder that holds none itself; `below` counts those in its folders.
+fn in_folders(folder: &Path, below: usize) -> String {
+    let (found, list) = match below {
+        0 => (String::new(), String::new()),
+        _ => (format!(" itself (studies in its folders: {below})"), format!(" {}", folder.display())),
+    };
+    format!("{found}; give the folder of a study, as `quadfrog study list{list}` names it")
 }
 
 impl EngineError {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::EngineError;
+use super::folder::{STUDY_FILE, study_files};
 use crate::config::Config;
 use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
@@ -91,7 +92,14 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
     if let Storage::File(file) = storage
         && !file.is_file()
     {
-        return Err(EngineError::NoJournal { file: file.clone() });
+        let folder = file.parent().filter(|folder| file.ends_with(STUDY_FILE) && folder.is_dir());
+        return Err(match folder {
+            Some(folder) => {
+                let below = study_files(folder).map_or(0, |files| files.len());
+                EngineError::NoStudyInFolder { folder: folder.to_owned(), below }
+            }
+            None => EngineError::NoJournal { file: file.clone() },
+        });
     }
     let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
     let living: Vec<&StudyRecord> = journal.state().studies().iter().filter(|study| !study.deleted).collect();

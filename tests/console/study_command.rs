@@ -44,6 +44,13 @@ fn studies_are_listed_and_shown() {
     assert!(program.refused(&["study", "list", "elsewhere"]).contains("elsewhere"));
     assert!(program.refused(&["study", "show", "elsewhere"]).contains("no such journal"));
     assert!(!program.path("elsewhere").exists());
+    // Regression: of a folder without a journal, too, there was "no such journal".
+    let message = program.refused(&["study", "show", "recordings"]);
+    let way = "give the folder of a study, as `quadfrog study list recordings` names it";
+    assert_shows(&message, &["recordings: this folder holds no study itself (studies in its folders: 1)", way]);
+    fs::create_dir(program.path("empty")).unwrap();
+    let message = program.refused(&["study", "best", "empty"]);
+    assert_shows(&message, &["empty: this folder holds no study; give", "as `quadfrog study list` names it"]);
     assert!(program.refused(&["study", "show", &study, "--name", "other"]).contains("forward-seed0"));
 }
 
