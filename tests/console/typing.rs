@@ -183,3 +183,16 @@ fn a_message_ends_with_what_it_describes() {
     assert_eq!(console.said(), "STOP: damping.");
     assert_eq!(console.press(&["Ctrl-C"]), [Effect::Stop], "the offer is over");
 }
+
+/// Regression: of an emptied number the form said "`` is not a number".
+#[test]
+fn a_number_of_the_form_that_is_none_is_asked_for_with_its_range() {
+    let mut console = Console::ready();
+    console.press(&["o", "Down", "1", "Backspace", "Enter"]);
+    assert_shows(&console.screen(80, 24), &["Fx needs a number from 0 to 150 N"]);
+    console.press(&["-", "Down"]);
+    assert_shows(&console.screen(80, 24), &["Fx needs a number from 0 to 150 N"]);
+    console.press(&["Backspace", "7", "0"]);
+    let wanted = OperatorRequest::Override { parameter: "Fx".into(), value: 70.0 };
+    assert_eq!(console.requests(&["Enter"]), [wanted]);
+}

@@ -32,17 +32,15 @@ impl OverrideForm {
     /// Takes the typed value over; false if it is refused, with the reason in `problem`.
     fn take_typed(&mut self) -> bool {
         let (Some(input), Some(row)) = (&self.typing, self.rows.get_mut(self.selected)) else { return true };
+        let (name, low, high, unit) = (&row.name, row.low, row.high, &row.unit);
         self.problem = match input.value().trim().replace(',', ".").parse::<f64>() {
             Ok(value) if (row.low..=row.high).contains(&value) => {
                 row.value = value;
                 self.typing = None;
                 None
             }
-            Ok(value) => {
-                let (name, low, high, unit) = (&row.name, row.low, row.high, &row.unit);
-                Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}"))
-            }
-            Err(_) => Some(format!("`{}` is not a number", input.value())),
+            Ok(value) => Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}")),
+            Err(_) => Some(format!("{name} needs a number from {low} to {high} {unit}")),
         };
         self.problem.is_none()
     }
