@@ -371,3 +371,25 @@ fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
     console.press(&["2", "Esc", "Esc"]);
     assert_eq!(console.said(), "cancelled: nothing was changed");
 }
+
+/// Regression: the arming checks and the lists of series and columns ignored a key without a meaning.
+#[test]
+fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
+    let mut console = Console::proposed();
+    for (view, open, keys) in [
+        ("1", "P", "Up Down PgUp PgDn Enter do"),
+        ("1", "T", "Up Down PgUp PgDn Home End x Enter do"),
+        ("2", "x", "Up Down PgUp PgDn Home End x Enter do"),
+    ] {
+        console.press(&[view, open, "z"]);
+        assert_shows(&console.screen(80, 24), &[&format!("z does nothing here; {keys}")]);
+        console.press(&["Down", "Esc"]);
+    }
+    console.model.session.info = SessionInfo { backend: Some(Backend::Hardware), ..session() };
+    assert_eq!(console.requests(&["P", "z"]), []);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down x PgUp PgDn Enter do"]);
+    // Arming that is refused has its reason.
+    console.mode(Mode::Ready);
+    assert_eq!(console.requests(&["A"]), []);
+    assert_shows(&console.screen(80, 24), &["not armed: "]);
+}

@@ -5,6 +5,7 @@ use std::time::Duration;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 
+use crate::keymap::Key;
 use crate::legal::{may_acknowledge, may_request};
 use crate::message::Effect;
 use crate::model::dialog::Dialog;
@@ -43,6 +44,11 @@ pub(super) fn reply(model: &mut Model, level: LogLevel, text: impl Into<String>)
 fn say_stop(model: &mut Model, text: &str) {
     model.message =
         Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true, answer: false, at: model.clock });
+}
+
+/// Returns the answer to a key without a meaning; `keys` names those that work.
+pub(super) fn does_nothing(key: Key, keys: &str) -> String {
+    format!("{key} does nothing here; {keys}")
 }
 
 /// Reports that a dialog ended without effect.

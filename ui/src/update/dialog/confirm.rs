@@ -14,7 +14,7 @@ use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Purpose, Question};
 use crate::update::perform::queued_values;
-use crate::update::request::{cancelled, refused, request, say};
+use crate::update::request::{cancelled, does_nothing, refused, request, say};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
 const CHECKS_PAGE: usize = 8;
@@ -185,7 +185,16 @@ pub(super) fn arming_checks_key(
         KeyCode::Char('x') => {
             effects = request(model, OperatorRequest::Confirm(OperatorCheck::ALL[selected.min(last)]))
         }
-        _ => {}
+        // Only one that is refused comes here.
+        _ if model.keymap.action(key) == Some(Action::Arm) => {
+            if let Err(reason) = legal(Action::Arm, model) {
+                effects = refused(model, "not armed", &reason);
+            }
+        }
+        _ => {
+            let keys = if simulated { "Up Down PgUp PgDn Enter do" } else { "Up Down x PgUp PgDn Enter do" };
+            say(model, LogLevel::Info, does_nothing(key, keys));
+        }
     }
     model.dialog = Some(Dialog::ArmingChecks { selected, scroll });
     effects

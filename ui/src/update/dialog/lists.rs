@@ -15,7 +15,7 @@ use crate::model::dialog::{Choice, Dialog, Question};
 use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
-use crate::update::request::{cancelled, refused, request, say};
+use crate::update::request::{cancelled, does_nothing, refused, request, say};
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -104,7 +104,7 @@ pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selec
             }
             Choice::Columns => toggle(&mut model.trial_table.columns, selected),
         },
-        _ => {}
+        _ => say(model, LogLevel::Info, does_nothing(key, "Up Down PgUp PgDn Home End x Enter do")),
     }
     model.dialog = Some(Dialog::Choose { subject, selected });
     Vec::new()
@@ -150,7 +150,7 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
                 Ok(()) => "Up Down Left Right x Enter do",
                 Err(_) => "Up Down Enter do",
             };
-            say(model, LogLevel::Info, format!("{key} does nothing here; {keys}"));
+            say(model, LogLevel::Info, does_nothing(key, keys));
             (selected, None)
         }
     };

@@ -10,7 +10,7 @@ use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
-use crate::update::request::{cancelled, request, say};
+use crate::update::request::{cancelled, does_nothing, request, say};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
@@ -101,7 +101,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             form.problem = match key.typed() {
                 _ if edits && edit(form.typing.get_or_insert_default(), key) => None,
                 Some(c) => Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
-                None => Some(format!("{key} does nothing here; {}", form.keys(model))),
+                None => Some(does_nothing(key, &form.keys(model))),
             };
         }
     }
