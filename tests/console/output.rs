@@ -5,14 +5,19 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::program::{Program, with_small_files};
+use crate::program::{Program, assert_shows, with_small_files};
 use crate::pty::Session;
+use crate::support::{Console, trial};
 use portable_pty::CommandBuilder;
+use quadfrog::recording::record::Record;
+use quadfrog::trial::Verdict;
+use quadfrog_console::message::Msg;
+use quadfrog_console::output::printable;
 
-/// Sets the title of a terminal, rings, and colours the rest red by an 8-bit control character.
-const HOSTILE: &str = "\u{1b}]0;owned\u{7}\u{9b}31m";
+/// Sets the title of a terminal, rings, colours the rest red by an 8-bit control character, and turns the direction of the rest.
+const HOSTILE: &str = "\u{1b}]0;owned\u{7}\u{9b}31m\u{202e}";
 /// The same in a string of JSON or of TOML.
-const ESCAPED: &str = r"\u001b]0;owned\u0007\u009b31m";
+const ESCAPED: &str = r"\u001b]0;owned\u0007\u009b31m\u202e";
 
 /// A study whose name, notes, causes and attributes are hostile, in a folder with a hostile name.
 fn hostile_study(program: &Program) -> String {
@@ -47,7 +52,7 @@ fn in_terminal(program: &Program, arguments: &[&str]) -> Session {
 
 /// Checks that a command printed no part of [`HOSTILE`] raw.
 fn assert_clean(session: &Session, command: &[&str]) {
-    for part in ["\u{1b}]0;owned", "owned\u{7}", "\u{9b}"] {
+    for part in ["\u{1b}]0;owned", "owned\u{7}", "\u{9b}", "\u{202e}"] {
         assert!(!session.sent(part.as_bytes()), "{command:?} prints {part:?}:\n{}", session.screen());
     }
 }
@@ -108,6 +113,26 @@ fn no_control_character_of_a_file_a_name_or_an_argument_reaches_the_terminal() {
     session.wait();
     assert_clean(&session, replay);
     assert!(in_terminal(&program, &["study", "list"]).sent(br"\u001b]0;owned"), "what was removed is not shown");
+}
+
+/// Regression: characters that turn the direction of a text reached the terminal from notes and names.
+#[test]
+fn no_character_that_turns_the_direction_of_a_text_is_printed_or_drawn() {
+    let turned = "\u{202e}\u{2066}\u{200f}";
+    assert_eq!(printable(&format!("a{turned}\tb\n")), "a\\u202e\\u2066\\u200f\tb\n");
+    let program = Program::new();
+    assert_shows(&program.refused(&["--operator", &format!("Ada{turned}")]), &["none of them a control character"]);
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note = format!("before{turned}after");
+    console.record(Record::Trial(row));
+    for keys in [&["2"][..], &["Enter"], &["Esc", "m"]] {
+        console.press(keys);
+        let screen = console.screen(120, 40);
+        assert!(screen.contains("beforeafter") && !turned.chars().any(|c| screen.contains(c)), "{screen}");
+    }
+    console.update(Msg::Paste(format!(" pasted{turned}text")));
+    assert_shows(&console.screen(120, 40), &["pastedtext"]);
 }
 
 #[test]

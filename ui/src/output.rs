@@ -1,17 +1,20 @@
 //! Standard output and standard error: the border that every text of a command crosses. Names of files, notes and journals of
-//! other programs may hold escape sequences, which would steer the terminal: no control character passes.
+//! other programs may hold escape sequences, which would steer the terminal, and characters that turn the direction of what
+//! follows: none of them passes.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
+use quadfrog::report::page::is_unprintable;
+
 /// The first error of standard output; a reader that has closed the pipe is none.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// Returns the text with every control character but line feed and tab as `\u001b`, which JSON strings allow, too.
+/// Returns the text with every character that is not printed, but line feed and tab, as `\u001b`, which JSON strings allow, too.
 pub fn printable(text: &str) -> Cow<'_, str> {
-    let harmless = |c: char| !c.is_control() || c == '\n' || c == '\t';
+    let harmless = |c: char| !is_unprintable(c) || c == '\n' || c == '\t';
     if text.chars().all(harmless) {
         return Cow::Borrowed(text);
     }

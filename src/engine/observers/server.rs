@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, line, make_socket_folder, read_message};
 use crate::realtime::channel::StopLatch;
 use crate::recording::record::LogLevel;
+use crate::report::page::is_unprintable;
 
 /// Most connections at a time; further ones are closed.
 const MOST_OBSERVERS: usize = 8;
@@ -143,7 +144,7 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
                 writer.write_all(&line(&Answer::Stopped)?)?;
             }
             Demand::Watch(of) if name.is_none() => {
-                let of: String = of.chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect();
+                let of: String = of.chars().filter(|c| !is_unprintable(*c)).take(LONGEST_NAME).collect();
                 shared.observers.fetch_add(1, Ordering::Relaxed);
                 shared.report(LogLevel::Info, format!("{of} watches this session"));
                 *name = Some(of);

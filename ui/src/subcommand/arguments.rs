@@ -14,6 +14,7 @@ use nix::unistd::{User, getuid};
 use quadfrog::config::Config;
 use quadfrog::engine::{Provenance, check_kept_config, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
+use quadfrog::report::page::is_unprintable;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::Network;
 use quadfrog::trial::Task;
@@ -222,7 +223,7 @@ const LONGEST_NAME: usize = 100;
 /// Parses the name of an operator.
 pub fn operator(text: &str) -> Result<String, String> {
     let length = text.chars().count();
-    if text.trim().is_empty() || length > LONGEST_NAME || text.chars().any(char::is_control) {
+    if text.trim().is_empty() || length > LONGEST_NAME || text.chars().any(is_unprintable) {
         return Err(format!("a name has 1 to {LONGEST_NAME} characters, none of them a control character"));
     }
     Ok(text.to_owned())

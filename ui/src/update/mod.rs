@@ -13,6 +13,7 @@ mod rejudged;
 mod request;
 
 use quadfrog::recording::record::LogLevel;
+use quadfrog::report::page::is_unprintable;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 
@@ -27,7 +28,7 @@ use crate::model::session::SessionModel;
 use crate::settings::BellCause;
 use dialog::KeyOutcome;
 use perform::perform;
-use request::{expire_interrupt, interrupt, request, stop};
+use request::{does_nothing, expire_interrupt, interrupt, request, stop};
 
 pub use request::say;
 
@@ -133,7 +134,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
         Some(action) => perform(model, action),
         None => {
             let help = model.keymap.key(Action::Help);
-            say(model, LogLevel::Info, format!("{key} does nothing here; {help} shows the keys"));
+            say(model, LogLevel::Info, does_nothing(key, &format!("{help} shows the keys")));
             Vec::new()
         }
     }
@@ -144,7 +145,7 @@ fn paste(model: &mut Model, text: &str) {
     if !model.dialog.as_ref().is_some_and(Dialog::takes_text) {
         return;
     }
-    for c in text.chars().filter(|c| !c.is_control()) {
+    for c in text.chars().filter(|c| !is_unprintable(*c)) {
         if let (Ok(key), Some(dialog)) = (c.to_string().parse::<Key>(), model.dialog.take()) {
             dialog::key(model, dialog, key);
         }

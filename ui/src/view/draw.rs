@@ -4,8 +4,10 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use quadfrog::report::page::is_unprintable;
 use quadfrog::trial::{ExpectedResult, Verdict};
 use ratatui::Frame;
+use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
@@ -90,6 +92,16 @@ pub fn truncate(text: &str, width: usize) -> String {
     let mut short: String = text.chars().take(width.saturating_sub(2)).collect();
     short.push_str("..");
     short
+}
+
+/// Removes the characters without a width that are not printed: a cell has them behind its own character.
+pub fn remove_unprintable(buffer: &mut Buffer) {
+    for cell in &mut buffer.content {
+        if cell.symbol().len() > 1 && cell.symbol().contains(is_unprintable) {
+            let printed = cell.symbol().replace(is_unprintable, "");
+            cell.set_symbol(&printed);
+        }
+    }
 }
 
 /// The cell of a share, 0 to 1, of a row or column of `cells`.

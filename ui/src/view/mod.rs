@@ -63,8 +63,13 @@ pub(crate) fn robot_drawing(area: Rect, row_height: f64, model: &Model) -> Optio
     wireframe::drawing(area, row_height, model)
 }
 
-/// Draws everything.
+/// Draws everything. Texts of persons and of files may hold characters that turn the direction of a line; they are left out.
 pub fn render(frame: &mut Frame, model: &Model) {
+    render_parts(frame, model);
+    draw::remove_unprintable(frame.buffer_mut());
+}
+
+fn render_parts(frame: &mut Frame, model: &Model) {
     let size = frame.area().as_size();
     let Some(Areas { frame: top, tabs, body, timeline, message, next_step }) = areas(size, model) else {
         return match compact_areas(size) {
