@@ -393,3 +393,28 @@ fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
     assert_eq!(console.requests(&["A"]), []);
     assert_shows(&console.screen(80, 24), &["not armed: "]);
 }
+
+/// Regressions: the form left the edges of the view uncovered at 80x24, where the cursor of the view stood beside its own; a long
+/// number pushed its upper bound to the next line.
+#[test]
+fn the_form_of_the_override_has_the_only_cursor_and_whole_rows() {
+    for view in ["1", "2", "4"] {
+        let mut console = Console::ready();
+        console.judged(2);
+        console.press(&[view, "o"]);
+        for (columns, rows) in [(60, 20), (80, 24), (120, 40), (200, 60)] {
+            let screen = console.screen(columns, rows);
+            assert_eq!(screen.matches('>').count(), 1, "{screen}");
+            assert!(columns > 80 || line_with(&screen, "> f0").starts_with('\u{2502}'), "{screen}");
+        }
+        console.enter("1.234567890123456789");
+        for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+            let row = line_with(&console.screen(columns, rows), "> f0");
+            assert_shows(&row, &["456789  Hz", "0.750 [", "] 1.750"]);
+        }
+        // The cursor stays in sight, and what is cut is not taken for the whole number.
+        assert_shows(&line_with(&console.screen(60, 20), "> f0"), &[" <456789  Hz"]);
+        console.press(&["Home"]);
+        assert_shows(&line_with(&console.screen(60, 20), "> f0"), &[" 1.23456> Hz", "] 1.750"]);
+    }
+}

@@ -339,6 +339,11 @@ impl Model {
         self.robot_is_energised() && self.space_bar_is_text()
     }
 
+    /// Whether keys choose a row of the view: an open dialog takes them, and has a cursor of its own.
+    pub fn chooses_row(&self) -> bool {
+        self.dialog.is_none()
+    }
+
     /// The parameter of the selected row of view Override; none for a gain.
     pub fn override_parameter(&self) -> Option<&ParameterInfo> {
         self.session.info.parameters.get(self.override_row)

@@ -50,7 +50,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         }
         Dialog::Quit => popup(frame, area, model, "Quit?", 58, questions::quit(model)),
         Dialog::Override(form) => {
-            popup(frame, area, model, &format!("Override trial #{}", form.trial), 78, overrides(model, form))
+            // The whole width of the smallest terminal: nothing of the view stands beside it there.
+            let lines = overrides(model, form, usize::from(area.width.min(MIN_COLUMNS).saturating_sub(4)));
+            popup(frame, area, model, &format!("Override trial #{}", form.trial), MIN_COLUMNS, lines)
         }
         Dialog::Field { purpose, input, replaces, problem } => {
             let lines = field(model, *purpose, (input, *replaces), problem.as_deref());
@@ -156,7 +158,11 @@ fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, 
     frame.render_widget(Paragraph::new(lines), inner);
 }
 
-fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
+/// Columns of a value of the form.
+const VALUE_WIDTH: usize = 8;
+
+/// The rows of the form; a number that is typed takes what the rest of its row leaves of `width` columns.
+fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
     for (index, row) in form.rows.iter().enumerate() {
@@ -167,21 +173,28 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
         let symbol = if selected { ">" } else { " " };
         let mut spans =
             vec![span(theme, if selected { Role::Key } else { Role::Text }, format!("{symbol} {:<8}", row.name))];
+        let mut after = vec![
+            span(theme, Role::Quiet, format!(" {:<9}", row.unit)),
+            span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))),
+            span(theme, Role::Quiet, scale(theme, row.value, row.low, row.high, 14)),
+            span(theme, Role::Quiet, format!(" {:<6}", number(row.high))),
+        ];
+        if row.value != row.before {
+            after.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
+        }
         match &form.typing {
             Some(input) if selected => {
+                let others: usize = spans.iter().chain(&after).map(Span::width).sum();
+                let room = width.saturating_sub(others).max(VALUE_WIDTH);
                 // As wide as the number that it replaces, so that the line does not shift.
-                spans.push(Span::raw(" ".repeat(8_usize.saturating_sub(input.value().chars().count() + 1))));
-                spans.extend(edited(theme, input));
+                let typed = edited_within(theme, input, room);
+                let columns = typed.iter().map(Span::width).sum();
+                spans.push(Span::raw(" ".repeat(VALUE_WIDTH.saturating_sub(columns))));
+                spans.extend(typed);
             }
-            _ => spans.push(Span::raw(format!("{:>8}", number(row.value)))),
+            _ => spans.push(Span::raw(format!("{:>VALUE_WIDTH$}", number(row.value)))),
         }
-        spans.push(span(theme, Role::Quiet, format!(" {:<9}", row.unit)));
-        spans.push(span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))));
-        spans.push(span(theme, Role::Quiet, scale(theme, row.value, row.low, row.high, 14)));
-        spans.push(span(theme, Role::Quiet, format!(" {:<6}", number(row.high))));
-        if row.value != row.before {
-            spans.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
-        }
+        spans.extend(after);
         lines.push(Line::from(spans));
     }
     let note = "This does not move the robot: it is approved like any other proposal.";
@@ -192,13 +205,24 @@ fn overrides(model: &Model, form: &OverrideForm) -> Vec<Line<'static>> {
 }
 
 fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
+    edited_within(theme, input, usize::MAX)
+}
+
+/// The text with its cursor; of one longer than `room` columns the part around the cursor, with `<` and `>` for the rest.
+fn edited_within(theme: &Theme, input: &Input, room: usize) -> Vec<Span<'static>> {
     let text: Vec<char> = input.value().chars().collect();
     let at = input.cursor().min(text.len());
-    let part = |chars: &[char]| chars.iter().collect::<String>();
+    let first = (at + 1).saturating_sub(room);
+    let end = first.saturating_add(room).min(text.len());
+    let (cut_before, cut_behind) = (first > 0, at + 1 < end && end < text.len());
+    let part = |from: usize, to: usize| text.get(from..to).unwrap_or_default().iter().collect::<String>();
+    let rest = |cut: bool, sign: &'static str| span(theme, Role::Quiet, if cut { sign } else { "" });
     vec![
-        Span::raw(part(&text[..at])),
+        rest(cut_before, "<"),
+        Span::raw(part(first + usize::from(cut_before), at)),
         span(theme, Role::Selected, text.get(at).map_or(" ".to_owned(), char::to_string)),
-        Span::raw(text.get(at + 1..).map(part).unwrap_or_default()),
+        Span::raw(part(at + 1, end - usize::from(cut_behind))),
+        rest(cut_behind, ">"),
     ]
 }
 

@@ -56,7 +56,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
 
 fn row(model: &Model, index: usize, info: &ParameterInfo, p: Option<&ProposedParameter>) -> Vec<Span<'static>> {
     let theme = &model.theme;
-    let selected = index == model.override_row;
+    let selected = index == model.override_row && model.chooses_row();
     let mut spans = vec![
         span(
             theme,

@@ -178,7 +178,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
             (false, true) => "~",
             (false, false) => " ",
         };
-        let number = format!("{}{:>3}{mark}", if selected { ">" } else { " " }, trial.trial);
+        let cursor = if selected && model.chooses_row() { ">" } else { " " };
+        let number = format!("{cursor}{:>3}{mark}", trial.trial);
         let mut spans = vec![span(theme, if later { Role::Quiet } else { Role::Text }, number)];
         for column in &columns {
             let (text, role) = cell(model, trial, column, best == Some(trial.trial));
