@@ -129,9 +129,12 @@ fn the_live_view_shows_the_trials_of_the_whole_file_from_the_start() {
             let line = line_of(&session, *trial).unwrap_or_else(|| panic!("no row {trial}:\n{}", session.screen()));
             assert!(line.contains(&format!("{trial}+")) && line.contains(row.verdict.unwrap().name()), "{line}");
         }
+        // Regression: nothing in this view said what the sign behind a number means.
+        assert_shows(&session.screen(), &["note | cause", "+ later"]);
         // The rows around the playhead stay in view.
         session.send(")");
         session.wait_until("no later row", || line_of(&session, 5).is_some_and(|line| !line.contains("5+")));
+        assert!(!session.screen().contains("+ later"), "{}", session.screen());
         session.send("q");
         assert!(session.wait().success());
     }

@@ -146,7 +146,12 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let columns = shown_columns(model, width, full);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
-    frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), Rect { height: 1, ..area });
+    let heading = Rect { height: 1, ..area };
+    frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), heading);
+    // In the whole table the line above says it.
+    if !full && model.later_trials().next().is_some() {
+        frame.render_widget(Line::from(span(theme, Role::Quiet, " + later")).right_aligned(), heading);
+    }
     let rows: Vec<&TrialRecord> = match full {
         true => model.trial_rows(),
         false => {
