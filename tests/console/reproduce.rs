@@ -1,5 +1,6 @@
 //! `quadfrog reproduce` on the running program.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -7,7 +8,11 @@ use std::process::{Command, Output, Stdio};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use quadfrog::control::settings::TaskControl;
+use quadfrog::trial::Task;
+use quadfrog_console::subcommand::{EXAMPLES, ExperimentConfiguration, minutes, seconds_left};
 use serde_json::Value;
+use strum::VariantArray;
 
 const QUADFROG: &str = env!("CARGO_BIN_EXE_quadfrog");
 
@@ -226,4 +231,44 @@ fn unusable_input_is_refused_before_the_work_with_its_remedy() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(parts.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
     }
+}
+
+#[test]
+fn every_configuration_loads() {
+    for configuration in ExperimentConfiguration::VARIANTS {
+        let loaded = configuration.load();
+        assert!(loaded.is_ok(), "{}: {}", configuration.name(), loaded.unwrap_err());
+    }
+}
+
+/// Regression: the cut-off of the example stayed on beside the words "the paper's controller".
+#[test]
+fn the_papers_controller_over_blocks_has_no_added_term() {
+    let task = |configuration: ExperimentConfiguration| *configuration.load().unwrap().task(Task::Forward);
+    let example = task(ExperimentConfiguration::RoughTerrain);
+    let TaskControl { stance_m, jumps, f1_hz, .. } = example;
+    let paper = TaskControl { stance_m, jumps, f1_hz, ..task(ExperimentConfiguration::Ideal) };
+    assert_eq!(task(ExperimentConfiguration::RoughTerrainPaper), paper);
+    assert_ne!(example, paper);
+}
+
+#[test]
+fn the_whole_folder_of_each_example_is_compiled_in() {
+    for files in EXAMPLES {
+        let folder = Path::new(files[0].0).parent().unwrap();
+        let compiled: BTreeSet<_> =
+            files.iter().map(|(path, _)| Path::new(path).file_name().unwrap().to_owned()).collect();
+        let entries = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        let toml = entries.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+        let found: BTreeSet<_> = toml.map(|path| path.file_name().unwrap().to_owned()).collect();
+        assert_eq!(compiled, found, "{}", folder.display());
+    }
+}
+
+#[test]
+fn the_time_left_follows_the_rate_and_is_not_given_before_it_is_known() {
+    assert_eq!(seconds_left(4, 100, 10.0), None);
+    assert_eq!(seconds_left(25, 100, 30.0), Some(90.0));
+    assert_eq!(seconds_left(100, 100, 30.0), Some(0.0));
+    assert_eq!((minutes(89.2), minutes(150.0)), ("90 s".to_owned(), "2.5 min".to_owned()));
 }

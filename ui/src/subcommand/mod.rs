@@ -37,6 +37,7 @@ pub use arguments::VERSION;
 pub use completion::answer_shell;
 pub use failure::Failure;
 use quadfrog::optimize::journal::notice_waits;
+pub use reproduce::{EXAMPLES, ExperimentConfiguration, minutes, seconds_left};
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///

@@ -37,7 +37,7 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("repeats", repeats);
     }
     if let Some(ran) = session.trials.ran.get(&trial.trial) {
-        let took = ran.ended_ns.map_or("still runs".to_owned(), |ended| {
+        let took = ran.ended_ns.map_or("no end so far".to_owned(), |ended| {
             format!("took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9)
         });
         row("ran", format!("at {} of the session, {took}", clock(ran.begun_ns)));

@@ -41,8 +41,7 @@ const LOW_JUMPS: ExampleFiles = example!("examples/rough_terrain/optimize.toml")
 const STABLE_LANDING: ExampleFiles = example!("examples/stable_landing/control.toml");
 
 /// All examples.
-#[cfg(test)]
-const EXAMPLES: [ExampleFiles; 7] =
+pub const EXAMPLES: [ExampleFiles; 7] =
     [CONTINUOUS, CONTINUOUS_FAST, CONTINUOUS_TWIST, HARDWARE_LIKE, HIGH_TWIST, ROUGH_TERRAIN, STABLE_LANDING];
 
 /// Objective and controller from the estimator, as on a robot.
@@ -135,49 +134,5 @@ impl ExperimentConfiguration {
             ConfigLayer { file, origin, text }
         };
         Config::layered(&self.files().map(layer).collect::<Vec<_>>())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::collections::BTreeSet;
-    use std::path::Path;
-
-    use quadfrog::control::settings::TaskControl;
-    use quadfrog::trial::Task;
-
-    use super::*;
-
-    #[test]
-    fn every_configuration_loads() {
-        for configuration in ExperimentConfiguration::VARIANTS {
-            let loaded = configuration.load();
-            assert!(loaded.is_ok(), "{}: {}", configuration.name(), loaded.unwrap_err());
-        }
-    }
-
-    /// Regression: the cut-off of the example stayed on beside the words "the paper's controller".
-    #[test]
-    fn the_papers_controller_over_blocks_has_no_added_term() {
-        let task = |configuration: ExperimentConfiguration| *configuration.load().unwrap().task(Task::Forward);
-        let example = task(ExperimentConfiguration::RoughTerrain);
-        let TaskControl { stance_m, jumps, f1_hz, .. } = example;
-        let paper = TaskControl { stance_m, jumps, f1_hz, ..task(ExperimentConfiguration::Ideal) };
-        assert_eq!(task(ExperimentConfiguration::RoughTerrainPaper), paper);
-        assert_ne!(example, paper);
-    }
-
-    #[test]
-    fn the_whole_folder_of_each_example_is_compiled_in() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        for files in EXAMPLES {
-            let folder = Path::new(files[0].0).parent().unwrap();
-            let compiled: BTreeSet<_> =
-                files.iter().map(|(path, _)| Path::new(path).file_name().unwrap().to_owned()).collect();
-            let entries = std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
-            let toml = entries.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
-            let found: BTreeSet<_> = toml.map(|path| path.file_name().unwrap().to_owned()).collect();
-            assert_eq!(compiled, found, "{}", folder.display());
-        }
     }
 }

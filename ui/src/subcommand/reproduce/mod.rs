@@ -18,10 +18,12 @@ use quadfrog::report::page::Page;
 use quadfrog::report::{html, svg, text};
 use quadfrog::session::parallel::cores;
 
+pub use self::configuration::{EXAMPLES, ExperimentConfiguration};
 use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
 use super::arguments::whole_number;
 use super::failure::Failure;
+pub use schedule::{minutes, seconds_left};
 
 /// Name of the results in the output folder.
 const RESULTS_FILE: &str = "results.json";

@@ -164,24 +164,12 @@ impl JobProgress {
 }
 
 /// Returns the time left at the rate so far, s; none before enough of the work is done.
-fn seconds_left(done: u64, all: u64, passed_s: f64) -> Option<f64> {
+pub fn seconds_left(done: u64, all: u64, passed_s: f64) -> Option<f64> {
     let share = done as f64 / all as f64;
     (share >= ESTIMATE_FROM).then(|| passed_s * (1.0 - share).max(0.0) / share)
 }
 
-fn minutes(seconds: f64) -> String {
+/// Returns a time in words: seconds below 90 s, minutes above.
+pub fn minutes(seconds: f64) -> String {
     if seconds < 90.0 { format!("{:.0} s", seconds.ceil()) } else { format!("{:.1} min", seconds / 60.0) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_time_left_follows_the_rate_and_is_not_given_before_it_is_known() {
-        assert_eq!(seconds_left(4, 100, 10.0), None);
-        assert_eq!(seconds_left(25, 100, 30.0), Some(90.0));
-        assert_eq!(seconds_left(100, 100, 30.0), Some(0.0));
-        assert_eq!((minutes(89.2), minutes(150.0)), ("90 s".to_owned(), "2.5 min".to_owned()));
-    }
 }
