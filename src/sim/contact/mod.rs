@@ -1,4 +1,4 @@
-//! Rigid unilateral contacts with Coulomb friction, joint stops and dry joint friction, all solved together.
+//! Rigid unilateral contacts with Coulomb friction, also on loose blocks, joint stops and dry joint friction, all solved together.
 //!
 //! The unknowns are the impulses p of one step, each in its friction cone K: |p_t| <= mu p_n. The cone is exact, not a
 //! pyramid. Two laws select the impulse of the cone (`contact.law`):

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::ContactPoint;
 use super::law::{LocalProblem, into_cone};
-use crate::robot::{JOINTS, Joints, LEGS, PerLeg};
+use crate::robot::{JOINTS, Joints, LEGS};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::Dynamics;
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
@@ -82,6 +82,7 @@ pub(in crate::sim) struct ContactSolver {
     slip_time_s: f64,
     contacts: Vec<ContactConstraint>,
     joint_rows: Vec<JointConstraint>,
+    sticking_legs: Vec<StickingLeg>,
     on_blocks: Vec<ContactOnBlock>,
     /// Loose blocks under the contacts.
     loose_blocks: Vec<LooseBlock>,
@@ -101,6 +102,7 @@ impl ContactSolver {
             config,
             contacts: Vec::with_capacity(MAX_CONTACTS),
             joint_rows: Vec::with_capacity(MAX_JOINT_ROWS),
+            sticking_legs: Vec::with_capacity(LEGS),
             on_blocks: Vec::with_capacity(MAX_CONTACTS),
             loose_blocks: Vec::with_capacity(MAX_CONTACTS),
             warm_start: vec![None; warm_start_slots],
@@ -280,15 +282,19 @@ impl ContactSolver {
         });
     }
 
-    /// Returns the legs that have dry friction, each with its first contact on ground that does not move.
-    fn sticking_legs(&self) -> PerLeg<Option<StickingLeg>> {
-        std::array::from_fn(|leg| {
+    /// Finds the legs that have dry friction, each with its first contact on ground that does not move.
+    fn find_sticking_legs(&mut self) {
+        self.sticking_legs.clear();
+        for leg in 0..LEGS {
             let is_own = |contact: &ContactConstraint| contact.leg == leg && contact.on_block.is_none();
-            let contact = self.contacts.iter().position(is_own)?;
             let row = |part| self.joint_rows.iter().position(|row| row.friction_of == Some(3 * leg + part));
-            let rows = [row(0)?, row(1)?, row(2)?];
-            Some(StickingLeg { contact, rows, sticks: [false; 3], factor: Cholesky6::IDENTITY })
-        })
+            if let (Some(a), Some(b), Some(c)) = (row(0), row(1), row(2))
+                && let Some(contact) = self.contacts.iter().position(is_own)
+            {
+                let (rows, sticks) = ([a, b, c], [false; 3]);
+                self.sticking_legs.push(StickingLeg { contact, rows, sticks, factor: Cholesky6::IDENTITY });
+            }
+        }
     }
 
     /// Solves for all impulses; returns the change of velocity that they make.
@@ -303,13 +309,13 @@ impl ContactSolver {
         for row in &self.joint_rows {
             row.add(&mut sums, row.impulse);
         }
-        let mut sticking_legs = self.sticking_legs();
+        self.find_sticking_legs();
         for sweep in 0..self.config.max_sweeps {
             if sweep < FLOOR_SWEEPS {
                 self.loose_blocks.iter_mut().for_each(LooseBlock::limit_floor_friction);
             }
             let mut change: f64 = 0.0;
-            for leg in sticking_legs.iter_mut().flatten() {
+            for leg in &mut self.sticking_legs {
                 leg.solve(&mut self.contacts, &mut self.joint_rows, &mut sums);
             }
             for contact in &mut self.contacts {
@@ -430,6 +436,7 @@ impl ContactConstraint {
 
 /// A leg with a contact and dry friction in its joints. While the contact and at least one joint stick, their rows are solved at once:
 /// a leg is light beside the trunk, and one row after the other such rows take dozens of sweeps to agree.
+#[derive(Debug, Clone)]
 struct StickingLeg {
     /// Index of its contact.
     contact: usize,

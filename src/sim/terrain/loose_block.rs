@@ -40,16 +40,15 @@ impl LooseBlock {
         block
     }
 
-    /// Sets the limit of the floor's friction to that of the robot's present impulse.
+    /// Sets the limit of the floor's friction to that of the robot's present impulse (Coulomb): mu (m g h + normal impulse).
     pub fn limit_floor_friction(&mut self) {
         self.most = self.floor_friction * (self.weight_impulse - self.impulse.z.min(0.0));
         self.push(&Vector3::zeros());
     }
 
-    /// Adds an impulse of the robot, world, N s.
+    /// Adds an impulse of the robot, world, N s. The floor takes of the momentum what its limit allows.
     pub fn push(&mut self, impulse_world: &Vector3<f64>) {
         self.impulse += impulse_world;
-        // Coulomb: the floor takes at most mu (m g h + normal impulse) of the momentum.
         let momentum = self.momentum();
         let size = momentum.norm();
         self.velocity =
