@@ -13,7 +13,7 @@ use crate::realtime::channel::{ControlPorts, Lowering, LoweringLatch, SHOWN_EVER
 use crate::realtime::clock::{Clock, SuspendWatch};
 use crate::realtime::thread::TickStart;
 use crate::robot::{CONTROL_PERIOD_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
-use crate::telemetry::{Command, Counters, Event, Mode, Snapshot, Tick, TrialInhibit};
+use crate::telemetry::{Command, Counters, Event, Mode, RecentLateness, Snapshot, Tick, TrialInhibit};
 
 /// Ticks between two updates of counters and readiness for the session; every event causes one too.
 const COUNTERS_EVERY: u64 = 100;
@@ -23,6 +23,7 @@ pub struct ControlLoop {
     cycle: Cycle,
     end: ControlPorts,
     counters: Counters,
+    lateness: RecentLateness,
     /// The reason for which a trial would not be approved, as of the last readiness.
     unready: Option<TrialInhibit>,
     heartbeat: HeartbeatWatch,
@@ -42,6 +43,7 @@ impl ControlLoop {
             cycle: Cycle::new(settings),
             end,
             counters: Counters::default(),
+            lateness: RecentLateness::default(),
             unready: None,
             heartbeat: HeartbeatWatch::default(),
             lowering: LoweringWatch::default(),
@@ -81,6 +83,7 @@ impl ControlLoop {
 
         counters.late_ticks += u64::from(start.lateness_ns as f64 > CONTROL_PERIOD_S * 1e9 / 2.0);
         counters.worst_lateness_ns = counters.worst_lateness_ns.max(start.lateness_ns);
+        self.lateness.see(time_ns, start.lateness_ns);
         counters.state_age_ms = cycle.state_age_ms();
         counters.link = robot.link();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
@@ -99,7 +102,7 @@ impl ControlLoop {
             counters.commands_refused += u64::from(matches!(event, Event::Refused { .. }));
             self.events_lost |= end.events.push(event).is_err();
         }
-        end.snapshot.write(Snapshot { tick, counters: *counters, unready: self.unready });
+        end.snapshot.write(Snapshot { tick, counters: *counters, unready: self.unready, lateness: self.lateness });
         cycle.last()
     }
 

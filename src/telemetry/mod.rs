@@ -15,4 +15,4 @@ pub(crate) use fault::digits_apart;
 pub use fault::{CommanderSign, FailsafeWarning, FallCause, Fault, SensorCheck, TrialInhibit};
 pub use landing_terms::{Cutoff, LandingTerms};
 pub use mode::{Mode, Phase, TransitionCause};
-pub use tick::{Counters, Estimate, Snapshot, Tick, TickDurations};
+pub use tick::{Counters, Estimate, RecentLateness, Snapshot, Tick, TickDurations};

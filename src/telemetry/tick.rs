@@ -87,6 +87,29 @@ pub struct Counters {
     pub link: Option<LinkStatus>,
 }
 
+/// The largest lateness of a tick in the present second and in the one before; the console, which does not see every tick, reads it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RecentLateness {
+    /// The present second of [`Tick::time_ns`].
+    pub second: u64,
+    /// In that second, ns.
+    pub present_ns: u64,
+    /// In the second before, ns.
+    pub before_ns: u64,
+}
+
+impl RecentLateness {
+    /// Takes a tick into account.
+    pub fn see(&mut self, time_ns: u64, lateness_ns: u64) {
+        let second = time_ns / 1_000_000_000;
+        if second != self.second {
+            let before_ns = if second == self.second + 1 { self.present_ns } else { 0 };
+            *self = RecentLateness { second, present_ns: 0, before_ns };
+        }
+        self.present_ns = self.present_ns.max(lateness_ns);
+    }
+}
+
 /// The newest tick and the counters, for the console.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Snapshot {
@@ -96,4 +119,6 @@ pub struct Snapshot {
     pub counters: Counters,
     /// The reason for which a trial would not be approved at present; none while one could be.
     pub unready: Option<TrialInhibit>,
+    /// How late ticks were of late.
+    pub lateness: RecentLateness,
 }

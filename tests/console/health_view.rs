@@ -3,7 +3,7 @@
 use crate::support::{Console, assert_shows, line_with, session, tick};
 use quadfrog::recording::record::Record;
 use quadfrog::robot::{Battery, LinkStatus};
-use quadfrog::telemetry::{Counters, Snapshot};
+use quadfrog::telemetry::{Counters, RecentLateness, Snapshot};
 use quadfrog_console::message::Msg;
 
 /// Ten minutes of a robot: a tick a second, with the values of each second.
@@ -49,6 +49,19 @@ fn a_key_shows_the_history_in_place_of_the_numbers() {
         console.press(&["t"]);
         assert_shows(&console.screen(columns, rows), &["Motors"]);
     }
+}
+
+/// Regression: the history had the lateness of the shown ticks, one of five, and contradicted the worst one beside it.
+#[test]
+fn the_history_has_the_worst_tick_of_a_second_also_if_it_is_not_shown() {
+    let mut console = ran(45.0, Some(80.0), true);
+    let lateness = RecentLateness { second: 499, present_ns: 17_650_000, before_ns: 12_500_000 };
+    console.update(Msg::Snapshot(Box::new(Snapshot { lateness, ..console.model.snapshot })));
+    let kept: Vec<f64> =
+        console.model.health_history.seconds().rev().take(3).map(|second| second.lateness_ms).collect();
+    assert_eq!(kept, [17.65, 12.5, 0.1]);
+    console.press(&["t"]);
+    assert_shows(&console.screen(80, 24), &["lateness 17.65 ms", "worst of each second"]);
 }
 
 #[test]

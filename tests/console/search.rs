@@ -531,7 +531,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
         ..LinkStatus::default()
     };
     let counters = Counters { link: Some(link), ..Counters::default() };
-    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, unready: None })));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, ..Snapshot::default() })));
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for view in View::VARIANTS.iter().copied() {
             console.model.view = view;
@@ -560,7 +560,7 @@ fn health_is_coloured_by_the_limits_of_the_session() {
     newest.state.battery = Some(Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] });
     let link = LinkStatus { state_age_ms: 8, rate_hz: 998, recent_received: 5_000, ..LinkStatus::default() };
     let counters = Counters { link: Some(link), ..Counters::default() };
-    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, unready: None })));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, ..Snapshot::default() })));
     console.model.view = View::Health;
     let mut marked = |limits: HealthLimits| {
         console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), limits, ..session() }));
@@ -588,7 +588,7 @@ fn health_says_what_the_recorder_writes_and_why_it_stopped() {
     console.press(&["5"]);
     let newest = Tick { mode: Mode::Disarmed, ..tick(10_000, 0.0, None) };
     let counters = Counters { ticks_not_recorded: 12, ..Counters::default() };
-    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, unready: None })));
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, ..Snapshot::default() })));
     console.update(Msg::Recorder(RecorderStatus { bytes: 4_000_000, ticks: 10_000, ..RecorderStatus::default() }));
     let disk = item(ArmingCheck::Disk, ArmingCheckState::Failed, "812 MB", "at least 1000 MB");
     console.record(Record::ArmingChecks(vec![disk]));

@@ -13,6 +13,28 @@ use quadfrog::sim::emulator::{EmulatorFault, EmulatorStatus};
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::Backend;
 
+/// Regression: one tick of five is shown, and the history of the lateness missed the worst of the others.
+#[test]
+fn the_console_reads_the_largest_lateness_of_every_tick() {
+    let (config, _, settings) = shipped(Backend::Hardware);
+    let (_, mut robot) = pair(&config.simulator, 1);
+    let (control, _session, mut screen, _recorder) = channels();
+    let mut body = ControlLoop::new(&settings, control);
+    let mut read_after = |last_ms: u64, late_ms: u64| {
+        for ms in last_ms - 20..=last_ms {
+            let lateness_ns = if ms == late_ms { 17_600_000 } else { 1000 };
+            body.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns }, &SimulatedClock, &mut robot);
+        }
+        screen.snapshot.read().lateness
+    };
+    let first = read_after(900, 887);
+    assert_eq!((first.present_ns, first.before_ns), (17_600_000, 0));
+    let second = read_after(first.second * 1000 + 1500, 0);
+    assert_eq!((second.second, second.present_ns, second.before_ns), (first.second + 1, 1000, 17_600_000));
+    let later = read_after(first.second * 1000 + 4500, 0);
+    assert_eq!((later.present_ns, later.before_ns), (1000, 0));
+}
+
 /// Over the link to an emulated robot on a bad network: taken over, armed, one jump and its review, a STOP, a restart.
 fn session(warm_up: bool) -> (Vec<Tick>, Vec<Event>, LinkStatus, EmulatorStatus) {
     let (config, _, settings) = shipped(Backend::Hardware);

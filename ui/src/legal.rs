@@ -283,11 +283,11 @@ fn may_judge(model: &Model, verdict: Verdict) -> Legality {
         let reason = format!("nothing was measured: {key} gives a value measured by hand, or judge it otherwise");
         return require(verdict != Verdict::Accept || value.is_some(), &reason);
     }
+    require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")?;
     let row = model.selected_trial().filter(|_| model.view == View::Trials);
     let Some((trial, before)) = row.and_then(|row| Some((row.trial, row.verdict?))) else {
         return refuse("no trial waits for a verdict; in Trials, select a judged one to change it");
     };
-    require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")?;
     if model.session.undoable() == Some(trial) {
         let undo = model.keymap.key(Action::Undo);
         return refuse(format!("the verdict of trial {trial} is the last one: {undo} takes it back"));
@@ -302,6 +302,7 @@ fn may_rerun(model: &Model) -> Legality {
     }
     match model.selected_trial() {
         Some(trial) if model.view == View::Trials && trial.verdict.is_some() => Ok(()),
+        _ if model.session.stage_is(ExperimentStage::Running) => refuse("a trial is running"),
         _ => refuse("no trial waits for a verdict; in Trials, select a judged one to run it again"),
     }
 }

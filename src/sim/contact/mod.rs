@@ -21,8 +21,10 @@
 //! (J_0 - J_l G_l) L^-T and U = J_l C_l^-T. The sweep keeps the sums y_0 = sum W^T p and y_l = sum U^T p, so the cost
 //! of one visit does not depend on the number of contacts.
 
+mod constraint;
 mod law;
 mod solver;
+mod sticking_leg;
 
 use nalgebra::{Matrix3, Vector3};
 

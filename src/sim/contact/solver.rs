@@ -3,13 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::ContactPoint;
+use super::constraint::{ContactConstraint, ContactOnBlock, ImpulseSums, JointConstraint};
 use super::law::{LocalProblem, into_cone};
+use super::sticking_leg::StickingLeg;
 use crate::robot::{JOINTS, Joints, LEGS};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::Dynamics;
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
 use crate::sim::quantities::stack;
-use crate::sim::six::{Cholesky6, Six, add_scaled, dot};
+use crate::sim::six::{add_scaled, dot};
 use crate::sim::terrain::LooseBlock;
 
 /// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
@@ -21,58 +23,6 @@ const MAX_JOINT_ROWS: usize = 2 * JOINTS;
 /// Sweeps in which the limit of the floor's friction under a loose block follows the impulses on the block. With a fixed limit the
 /// sweeps reduce one energy, and converge.
 const FLOOR_SWEEPS: u32 = 10;
-
-/// Three constraint rows of one contact: normal, tangent, tangent.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::sim) struct ContactConstraint {
-    /// Leg of the point, or [`TRUNK`].
-    leg: usize,
-    /// Index of its warm-start impulse.
-    pub warm_start_slot: usize,
-    /// Index of its block in [`ContactSolver::on_blocks`], if that is loose.
-    on_block: Option<usize>,
-    /// Columns normal, two tangents, body axes.
-    axes_body: Matrix3<f64>,
-    /// W.
-    trunk_rows: [Six; 3],
-    /// U; zero for the trunk.
-    leg_rows: Matrix3<f64>,
-    /// Right-hand side: velocity without impulses, less the velocity that may remain after the step.
-    rhs: Vector3<f64>,
-    local: LocalProblem,
-    /// Normal, tangent, tangent, N s.
-    impulse: Vector3<f64>,
-    /// Impulse of the ground on the robot, world, N s; known after [`ContactSolver::solve`].
-    pub impulse_world: Vector3<f64>,
-}
-
-/// A contact whose ground is a loose block.
-#[derive(Debug, Clone, Copy)]
-struct ContactOnBlock {
-    /// Index in [`ContactSolver::loose_blocks`].
-    block: usize,
-    /// Columns normal, two tangents, world.
-    axes_world: Matrix3<f64>,
-    /// The contact while the block slides; [`ContactConstraint::local`] is the contact with a block at rest.
-    sliding: LocalProblem,
-}
-
-/// The constraint row of a joint's stop or dry friction: an impulse between two bounds.
-#[derive(Debug, Clone, Copy)]
-struct JointConstraint {
-    leg: usize,
-    /// Joint of a friction row, whose impulse is kept for the next step; none for a stop.
-    friction_of: Option<usize>,
-    trunk_row: Six,
-    leg_row: Vector3<f64>,
-    /// Diagonal element of the Delassus matrix.
-    delassus: f64,
-    /// Right-hand side, as for a contact.
-    rhs: f64,
-    lowest: f64,
-    highest: f64,
-    impulse: f64,
-}
 
 /// The constraints of one step, and the impulses of the last one.
 #[derive(Debug, Clone)]
@@ -291,8 +241,7 @@ impl ContactSolver {
             if let (Some(a), Some(b), Some(c)) = (row(0), row(1), row(2))
                 && let Some(contact) = self.contacts.iter().position(is_own)
             {
-                let (rows, sticks) = ([a, b, c], [false; 3]);
-                self.sticking_legs.push(StickingLeg { contact, rows, sticks, factor: Cholesky6::IDENTITY });
+                self.sticking_legs.push(StickingLeg::new(contact, [a, b, c]));
             }
         }
     }
@@ -353,151 +302,6 @@ impl ContactSolver {
         let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         GeneralizedVelocity { trunk, legs }
     }
-}
-
-/// y_0 = sum W^T p and y_l = sum U^T p; the last leg stands for the trunk and stays zero.
-struct ImpulseSums {
-    trunk: Six,
-    legs: [Vector3<f64>; LEGS + 1],
-}
-
-impl JointConstraint {
-    /// Velocity less the velocity that may remain.
-    #[inline]
-    fn velocity(&self, sums: &ImpulseSums) -> f64 {
-        self.rhs + dot(&self.trunk_row, &sums.trunk) + self.leg_row.dot(&sums.legs[self.leg])
-    }
-
-    /// Adds the impulse `p` to the sums.
-    #[inline]
-    fn add(&self, sums: &mut ImpulseSums, p: f64) {
-        add_scaled(&mut sums.trunk, &self.trunk_row, p);
-        sums.legs[self.leg] += self.leg_row * p;
-    }
-}
-
-impl ContactConstraint {
-    /// Velocity less the velocity that may remain: W y_0 + U y_l + rhs.
-    #[inline]
-    fn velocity(&self, sums: &ImpulseSums) -> Vector3<f64> {
-        let [w1, w2, w3] = &self.trunk_rows;
-        let trunk = Vector3::new(dot(w1, &sums.trunk), dot(w2, &sums.trunk), dot(w3, &sums.trunk));
-        self.rhs + trunk + self.leg_rows * sums.legs[self.leg]
-    }
-
-    /// Solves for the impulse with all others fixed; returns the change of the velocity that it makes, m/s.
-    #[inline]
-    fn solve(
-        &mut self,
-        sums: &mut ImpulseSums,
-        on_block: Option<&mut ContactOnBlock>,
-        loose_blocks: &mut [LooseBlock],
-    ) -> f64 {
-        let velocity = self.velocity(sums);
-        let Some(ContactOnBlock { block, axes_world, sliding }) = on_block else {
-            let (impulse, change) = self.local.solve(&velocity, &self.impulse);
-            self.set_impulse(sums, &impulse);
-            return change;
-        };
-        let block = &mut loose_blocks[*block];
-        let push = |impulse: &Vector3<f64>| *axes_world * (self.impulse - impulse);
-        // The impulse on a block at rest, if the block rests under it; otherwise that on a block with the floor's present friction.
-        let (mut impulse, mut change) =
-            self.local.solve(&(velocity - axes_world.tr_mul(&block.stop_world())), &self.impulse);
-        if !block.rests_with(&push(&impulse)) {
-            let velocity = velocity - axes_world.tr_mul(&block.velocity_change_world());
-            (impulse, change) = sliding.solve(&velocity, &self.impulse);
-        }
-        block.push(&push(&impulse));
-        self.set_impulse(sums, &impulse);
-        change
-    }
-
-    #[inline]
-    fn set_impulse(&mut self, sums: &mut ImpulseSums, impulse: &Vector3<f64>) {
-        self.add(sums, &(impulse - self.impulse));
-        self.impulse = *impulse;
-    }
-
-    /// Adds the impulse `p` to the sums.
-    #[inline]
-    fn add(&self, sums: &mut ImpulseSums, p: &Vector3<f64>) {
-        for (row, p) in self.trunk_rows.iter().zip(p.iter()) {
-            add_scaled(&mut sums.trunk, row, *p);
-        }
-        sums.legs[self.leg] += self.leg_rows.tr_mul(p);
-    }
-
-    /// Normal component of the impulse, out of the ground, N s.
-    pub fn normal_impulse(&self) -> f64 {
-        self.impulse.x
-    }
-}
-
-/// A leg with a contact and dry friction in its joints. While the contact and at least one joint stick, their rows are solved at once:
-/// a leg is light beside the trunk, and one row after the other such rows take dozens of sweeps to agree.
-#[derive(Debug, Clone)]
-struct StickingLeg {
-    /// Index of its contact.
-    contact: usize,
-    /// Indices of the friction rows of its joints.
-    rows: [usize; 3],
-    /// Which of these rows stick: their impulses are within the bounds.
-    sticks: [bool; 3],
-    /// Factor of the Delassus matrix of the contact and the rows that stick; 1 on the diagonal for the others.
-    factor: Cholesky6,
-}
-
-impl StickingLeg {
-    /// Takes the velocities of the rows that stick to zero. Changes nothing if that takes an impulse out of its bounds: the sweep
-    /// finds out what slides.
-    fn solve(
-        &mut self,
-        contacts: &mut [ContactConstraint],
-        joint_rows: &mut [JointConstraint],
-        sums: &mut ImpulseSums,
-    ) {
-        let contact = &mut contacts[self.contact];
-        let rows = self.rows.map(|row| joint_rows[row]);
-        let sticks = rows.each_ref().map(|row| row.lowest < row.impulse && row.impulse < row.highest);
-        if sticks == [false; 3] || contact.impulse.x <= 0.0 || !contact.local.holds(&contact.impulse) {
-            return;
-        }
-        if sticks != self.sticks {
-            self.sticks = sticks;
-            self.factor = Cholesky6::new(sticking_delassus(contact, &rows, &sticks));
-        }
-        let v = contact.velocity(sums);
-        let row_velocity = |i: usize| if sticks[i] { -rows[i].velocity(sums) } else { 0.0 };
-        let mut step = [-v.x, -v.y, -v.z, row_velocity(0), row_velocity(1), row_velocity(2)];
-        self.factor.solve_lower(&mut step);
-        self.factor.solve_upper(&mut step);
-        let contact_step = Vector3::new(step[0], step[1], step[2]);
-        let within = |(row, step): (&JointConstraint, &f64)| (row.lowest..=row.highest).contains(&(row.impulse + step));
-        if !contact.local.holds(&(contact.impulse + contact_step)) || !rows.iter().zip(&step[3..]).all(within) {
-            return;
-        }
-        contact.impulse += contact_step;
-        contact.add(sums, &contact_step);
-        for (row, step) in self.rows.iter().zip(&step[3..]) {
-            joint_rows[*row].impulse += step;
-            joint_rows[*row].add(sums, *step);
-        }
-    }
-}
-
-/// Delassus matrix of a contact and the friction rows of its leg that stick, lower triangle by columns; 1 on the diagonal of the others.
-fn sticking_delassus(contact: &ContactConstraint, rows: &[JointConstraint; 3], sticks: &[bool; 3]) -> [Six; 6] {
-    let ([w1, w2, w3], u) = (contact.trunk_rows, contact.leg_rows.transpose());
-    let trunk_rows = [w1, w2, w3, rows[0].trunk_row, rows[1].trunk_row, rows[2].trunk_row];
-    let leg_rows: [Vector3<f64>; 6] =
-        [u.column(0).into(), u.column(1).into(), u.column(2).into(), rows[0].leg_row, rows[1].leg_row, rows[2].leg_row];
-    let is_in = |row: usize| row < 3 || sticks[row - 3];
-    let element = |i: usize, j: usize| match i >= j && is_in(i) && is_in(j) {
-        true => dot(&trunk_rows[i], &trunk_rows[j]) + leg_rows[i].dot(&leg_rows[j]),
-        false => f64::from(i == j),
-    };
-    std::array::from_fn(|j| std::array::from_fn(|i| element(i, j)))
 }
 
 /// Returns the normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1),

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use quadfrog::telemetry::{Counters, Tick};
+use quadfrog::telemetry::{Counters, RecentLateness, Tick};
 
 /// Seconds that are kept.
 const CAPACITY: usize = 1800;
@@ -57,6 +57,17 @@ impl HealthHistory {
             self.seconds.pop_front();
         }
         self.seconds.push_back(now);
+    }
+
+    /// Takes over the lateness of ticks that are not shown.
+    pub fn see_lateness(&mut self, lateness: &RecentLateness) {
+        for (second, worst_ns) in
+            [(lateness.second, lateness.present_ns), (lateness.second.wrapping_sub(1), lateness.before_ns)]
+        {
+            if let Some(kept) = self.seconds.iter_mut().rev().take(3).find(|kept| kept.second == second) {
+                kept.lateness_ms = kept.lateness_ms.max(worst_ns as f64 / 1e6);
+            }
+        }
     }
 
     /// Clears the history: time has jumped.

@@ -27,12 +27,14 @@ pub struct SessionLog {
 }
 
 impl SessionLog {
-    /// Appends a line; the oldest one goes when the log is full.
+    /// Adds a line in the order of time, behind those of its own time; the oldest one goes when the log is full. Lines of several threads
+    /// arrive milliseconds apart.
     pub fn push(&mut self, line: LogLine) {
         if self.lines.len() == CAPACITY {
             self.lines.pop_front();
         }
-        self.lines.push_back(line);
+        let later = self.lines.iter().rev().take_while(|other| other.time_ns > line.time_ns).count();
+        self.lines.insert(self.lines.len() - later, line);
     }
 }
 

@@ -108,6 +108,8 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     }
     if let Some(trial) = arguments.trial {
         require_trial(&players, trial).map_err(|refusal| Failure::input(format!("{}: {refusal}", file.display())))?;
+        // What is lost of other files is no loss of this trial.
+        players.retain(|player| player.trials_with_ticks().any(|with_ticks| with_ticks == trial));
     }
     let (from_ns, until_ns) = arguments.time.unwrap_or((0, u64::MAX));
     let range = SignalRange { trial: arguments.trial, from_ns, until_ns };
@@ -131,7 +133,10 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     }
     match players.iter().filter_map(Player::damage).collect::<Vec<_>>() {
         damage if damage.is_empty() => Ok(()),
-        damage => Err(Failure::Other(anyhow!("{}; what can be read is exported", damage.join("\n")))),
+        damage => {
+            let way = format!("`quadfrog recover {}` mends a file that was not finished", file.display());
+            Err(Failure::Other(anyhow!("{}; what can be read is exported; {way}", damage.join("\n"))))
+        }
     }
 }
 

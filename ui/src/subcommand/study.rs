@@ -154,7 +154,13 @@ fn list(folder: &Path) -> Result<(), Failure> {
             }
         }
     }
-    output::text(&table::aligned(&rows, |column| column < 2));
+    // The console's folders name task and seed: the table fits a terminal of 80 columns without them.
+    let named = |row: &Vec<String>| row[0].ends_with(&format!("-{}-seed{}", row[1], row[2]));
+    let are_named = rows.iter().skip(1).all(named);
+    if are_named {
+        rows.iter_mut().for_each(|row| drop(row.drain(1..3)));
+    }
+    output::text(&table::aligned(&rows, |column| column == 0 || column == 1 && !are_named));
     Ok(())
 }
 
@@ -242,6 +248,12 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         Some(_) => table::table(&rows, best, parameters, unit),
         None => table::other_program(study.trials(), best),
     };
+    let not_run = rows.iter().filter(|row| row.was_not_run()).count();
+    if not_run > 0 {
+        let proposals = counted(not_run as u32, "proposal");
+        let _ =
+            writeln!(text, "{} that ran, {proposals} that did not", counted((rows.len() - not_run) as u32, "trial"));
+    }
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
     }

@@ -67,6 +67,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
                 model.snapshot_at = model.clock;
             }
             model.snapshot = *snapshot;
+            model.health_history.see_lateness(&model.snapshot.lateness);
             records::close_stale_dialog(model);
             return count_down(model);
         }

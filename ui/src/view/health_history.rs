@@ -40,7 +40,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, alone: bool) {
         true => format!("; numbers ({})", model.keymap.key(Action::Series)),
         false => String::new(),
     };
-    let aside = format!("worst of each second{numbers}");
+    // A replay reads only the ticks that it shows.
+    let of = if model.replay.is_some() { ", of one tick in five" } else { "" };
+    let aside = format!("worst of each second{of}{numbers}");
     let body = heading(frame, area, &model.theme, "Health of the last 10 minutes", &aside);
     let limits = &model.session.info.limits;
     let charts = [

@@ -77,10 +77,16 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     spans.push(Span::raw(session.task_name()));
     if let Some(info) = model.session.stage {
         let (finished, budget) = (model.session.counted(), model.session.budget());
-        spans.push(Span::raw(match narrow {
-            true => format!("  trial #{}  {finished}/{budget}", info.trial),
-            false => format!("   trial #{}   {finished} of {budget} counted", info.trial),
-        }));
+        let (trial, counted) = match narrow {
+            true => (format!("  trial #{}", info.trial), format!("  {finished}/{budget}")),
+            false => (format!("   trial #{}", info.trial), format!("   {finished} of {budget} counted")),
+        };
+        for part in [trial, counted] {
+            if spans.iter().map(Span::width).sum::<usize>() + part.len() > room {
+                break;
+            }
+            spans.push(Span::raw(part));
+        }
     }
     if let Some((best, value)) = model.session.trials.best_value() {
         let before = spans.len();

@@ -2,7 +2,7 @@
 
 use quadfrog::trial::{TrialRecord, Verdict};
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
@@ -146,12 +146,18 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let columns = shown_columns(model, width, full);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
     let title = format!("{:>4} {}", "#", titles.join(" "));
-    let heading = Rect { height: 1, ..area };
-    frame.render_widget(Line::from(span(theme, Role::Heading, truncate(&title, width))), heading);
     // In the whole table the line above says it.
-    if !full && model.later_trials().next().is_some() {
-        frame.render_widget(Line::from(span(theme, Role::Quiet, " + later")).right_aligned(), heading);
+    let later = if !full && model.later_trials().next().is_some() { " + later" } else { "" };
+    let mut title = truncate(&title, width);
+    // In its place only whole titles.
+    while !later.is_empty() && title.trim_end().chars().count() + later.len() > width {
+        title = title.trim_end().rsplit_once(' ').map_or(String::new(), |(whole, _)| whole.to_owned());
     }
+    let (heading, later) = (span(theme, Role::Heading, title), span(theme, Role::Quiet, later));
+    let areas = Layout::horizontal([Constraint::Fill(1), Constraint::Length(later.width() as u16)]);
+    let [left, right] = areas.areas(Rect { height: 1, ..area });
+    frame.render_widget(Line::from(heading), left);
+    frame.render_widget(Line::from(later), right);
     let rows: Vec<&TrialRecord> = match full {
         true => model.trial_rows(),
         false => {
