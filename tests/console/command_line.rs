@@ -292,6 +292,7 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         (&["export", "--trial", "x", "session.mcap"], "for '--trial <N>': give a whole number from 0 to 4294967295"),
         (&["prior", "--jobs", "1.5"], "for '--jobs <N>': give a whole number from 1 to 65535"),
         (&["study", "list"], "recordings: there is no such folder; give a folder that holds studies"),
+        (&["--observe", "--resume", "recordings"], "'--observe' cannot be used with '--resume <DIR>'"),
         (&["replay", "notes.txt"], "give one, or the folder of its study"),
         (
             &["optimize", "--trials", "1", "--output", "notes.txt/below"],

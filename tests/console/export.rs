@@ -123,7 +123,13 @@ fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
     let output = program.run(&["export", "cut.mcap.part", "-o", "cut.csv"]);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");
-    assert_shows(&message, &["cut.mcap.part", "cut off", "what can be read is exported"]);
+    assert_shows(&message, &["cut.mcap.part", "cut off", "what can be read is exported", "quadfrog recover"]);
+    // A trial that is whole in another file is exported without an error.
+    fs::create_dir(program.path("both")).unwrap();
+    fs::copy(&recording, program.path("both/session.mcap")).unwrap();
+    fs::copy(program.path("cut.mcap.part"), program.path("both/session-2.mcap.part")).unwrap();
+    program.text(&["export", "both", "--trial", "1", "-o", "trial.csv"]);
+    assert_eq!(program.run(&["export", "both", "-o", "both.csv"]).status.code(), Some(1));
     let rows = fs::read_to_string(program.path("cut.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, ticks(program.path("cut.mcap.part").to_str().unwrap()).len());
     assert!(rows > 1000);

@@ -21,6 +21,21 @@ fn logged(texts: &[&str]) -> Console {
     console
 }
 
+/// Regression: a line that another thread wrote five milliseconds later stood above the earlier one.
+#[test]
+fn lines_stand_in_the_order_of_time() {
+    let mut console = Console::new();
+    console.record(Record::Session(session()));
+    for (time_ns, text) in [(1_000_000_000, "first"), (1_005_000_000, "third"), (1_000_000_001, "second")] {
+        let log = LogRecord { level: LogLevel::Warning, source: "test".into(), message: text.into() };
+        console.update(Msg::Record(Stamped { time_ns, record: Record::Log(log) }));
+    }
+    console.press(&["6"]);
+    let screen = console.screen(120, 40);
+    let [first, second, third] = ["first", "second", "third"].map(|text| screen.find(text).unwrap());
+    assert!(first < second && second < third, "{screen}");
+}
+
 #[test]
 fn a_line_opens_whole_and_shows_its_neighbours() {
     // Longer than the three rows of the message at each width.
