@@ -87,7 +87,7 @@ pub struct Counters {
     pub link: Option<LinkStatus>,
 }
 
-/// The largest lateness of a tick in the present second and in the one before; the console, which does not see every tick, reads it.
+/// The largest lateness of a tick in the present second and in the one before, for the console, which does not see every tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RecentLateness {
     /// The present second of [`Tick::time_ns`].
@@ -119,6 +119,6 @@ pub struct Snapshot {
     pub counters: Counters,
     /// The reason for which a trial would not be approved at present; none while one could be.
     pub unready: Option<TrialInhibit>,
-    /// How late ticks were of late.
+    /// Lateness of the ticks of the last two seconds.
     pub lateness: RecentLateness,
 }

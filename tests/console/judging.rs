@@ -42,7 +42,8 @@ fn landed(after_ms: u64) -> Console {
 fn impulse_and_flight(screen: &str) -> Option<(usize, usize)> {
     let line = screen.lines().find(|line| line.contains("flight"))?;
     let column = |name: &str| line.find(name).map(|at| line[..at].chars().count());
-    let (impulse, flight, landing) = (column("impu")?, column("flight")?, column("landing")?);
+    let (impulse, flight, landing) =
+        (column("impulse").or_else(|| column("push"))?, column("flight")?, column("landing")?);
     Some((flight - impulse, landing - flight))
 }
 

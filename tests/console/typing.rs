@@ -196,3 +196,28 @@ fn a_number_of_the_form_that_is_none_is_asked_for_with_its_range() {
     let wanted = OperatorRequest::Override { parameter: "Fx".into(), value: 70.0 };
     assert_eq!(console.requests(&["Enter"]), [wanted]);
 }
+
+/// Regression: after a refused 99 the form appended (991..5), and a field of a number did or did not, depending on the refusal.
+#[test]
+fn typing_replaces_a_number_that_was_refused() {
+    let mut console = Console::ready();
+    console.press(&["o", "Down", "9", "9", "9", "Enter"]);
+    assert_shows(&console.screen(80, 24), &["Fx = 999 N is outside 0 to 150 N"]);
+    console.press(&["8", "5"]);
+    let wanted = OperatorRequest::Override { parameter: "Fx".into(), value: 85.0 };
+    assert_eq!(console.requests(&["Enter"]), [wanted]);
+    // A key without a meaning keeps what was typed.
+    console.press(&["o", "Down", "7", "F5", "6"]);
+    let wanted = OperatorRequest::Override { parameter: "Fx".into(), value: 76.0 };
+    assert_eq!(console.requests(&["Enter"]), [wanted]);
+    // So does one in a field with a default, and a refused range is replaced.
+    console.press(&["4", "X", "F5"]);
+    let fixed = console.requests(&["3", "Enter"]);
+    assert_eq!(fixed, [OperatorRequest::Fix { parameter: "Fx".into(), value: 75.0, trials: 3 }]);
+    console.press(&["B"]);
+    console.enter("120..50");
+    console.press(&["Enter"]);
+    console.enter("50..120");
+    let bounds = console.requests(&["Enter"]);
+    assert_eq!(bounds, [OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.0 }]);
+}

@@ -214,6 +214,8 @@ pub struct OverrideForm {
     pub rows: Vec<OverrideRow>,
     pub selected: usize,
     pub typing: Option<Input>,
+    /// Whether the whole typed number is selected, because it was refused: the first character typed replaces it.
+    pub replaces: bool,
     pub problem: Option<String>,
 }
 
@@ -251,7 +253,7 @@ impl OverrideForm {
         let gains = proposal.gains.iter().filter_map(|p| Some(row(p, session.gain(&p.name)?.clone(), true)));
         let rows: Vec<OverrideRow> = parameters.chain(gains).collect();
         let selected = selected.min(rows.len().saturating_sub(1));
-        OverrideForm { trial: proposal.trial, rows, selected, typing: None, problem: None }
+        OverrideForm { trial: proposal.trial, rows, selected, typing: None, replaces: false, problem: None }
     }
 
     /// Whether it holds values that the session has not received.

@@ -371,15 +371,19 @@ fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u
     })
 }
 
-/// A line under charts with the name of each phase of a jump, marked at its begin: `|impu|flight--|landing-`. Where a phase is narrow
-/// its name has four letters, or none.
+/// A line under charts with the name of each phase of a jump, marked at its begin: `|push|flight--|landing-`. Where a phase is narrow
+/// it has a shorter name, or none.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
     let columns: Vec<_> = jump_columns(phases, area.width).collect();
     let joined = |a: &(u16, (Role, &str)), b: &(u16, (Role, &str))| a.1.1 == b.1.1 && b.0 == a.0 + 1;
     for run in columns.chunk_by(joined) {
         let name = run[0].1.1;
         let fits = |text: &&str| run.len() > text.len();
-        let short = &name[..name.len().min(4)];
+        let short = match run[0].1.0 {
+            Role::ShadeImpulse => "push",
+            Role::ShadeFlight => "air",
+            _ => "land",
+        };
         let shown = [name, short].into_iter().find(fits).unwrap_or_default();
         let begin = if run.len() > 1 { theme.bar() } else { theme.line() };
         let line = theme.line().repeat(run.len() - shown.len() - 1);

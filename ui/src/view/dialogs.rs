@@ -187,7 +187,10 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
                 let others: usize = spans.iter().chain(&after).map(Span::width).sum();
                 let room = width.saturating_sub(others).max(VALUE_WIDTH);
                 // As wide as the number that it replaces, so that the line does not shift.
-                let typed = edited_within(theme, input, room);
+                let typed = match form.replaces && input.value().chars().count() <= room {
+                    true => vec![span(theme, Role::Selected, input.value())],
+                    false => edited_within(theme, input, room),
+                };
                 let columns = typed.iter().map(Span::width).sum();
                 spans.push(Span::raw(" ".repeat(VALUE_WIDTH.saturating_sub(columns))));
                 spans.extend(typed);

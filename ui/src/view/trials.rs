@@ -151,7 +151,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let mut title = truncate(&title, width);
     // In its place only whole titles.
     while !later.is_empty() && title.trim_end().chars().count() + later.len() > width {
-        title = title.trim_end().rsplit_once(' ').map_or(String::new(), |(whole, _)| whole.to_owned());
+        let shorter = title.trim_end().rsplit_once(' ').map_or("", |(whole, _)| whole);
+        title = shorter.trim_end_matches([' ', '|']).to_owned();
     }
     let (heading, later) = (span(theme, Role::Heading, title), span(theme, Role::Quiet, later));
     let areas = Layout::horizontal([Constraint::Fill(1), Constraint::Length(later.width() as u16)]);

@@ -3,6 +3,7 @@
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
+use tui_input::Input;
 
 use super::text_field::{NOT_OF_A_NUMBER, edit};
 use crate::action::Action;
@@ -42,7 +43,8 @@ impl OverrideForm {
             Ok(value) => Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}")),
             Err(_) => Some(format!("{name} needs a number from {low} to {high} {unit}")),
         };
-        self.problem.is_none()
+        self.replaces = self.problem.is_some();
+        !self.replaces
     }
 
     /// The keys that work, for the answer to another one.
@@ -98,6 +100,10 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             // Only the characters of a number can be typed here.
             let digit = matches!(key.typed(), Some('0'..='9' | '.' | ',' | '-' | '+' | 'e'));
             let edits = digit || form.typing.is_some() && key.typed().is_none();
+            let deletes = matches!(key.code(), KeyCode::Backspace | KeyCode::Delete);
+            if std::mem::take(&mut form.replaces) && (digit || deletes) {
+                form.typing = Some(Input::default());
+            }
             form.problem = match key.typed() {
                 _ if edits && edit(form.typing.get_or_insert_default(), key) => None,
                 Some(c) => Some(format!("`{c}`{NOT_OF_A_NUMBER}")),

@@ -33,7 +33,8 @@ pub(super) fn key(
     let not_of_it = if purpose == Purpose::Seek { NOT_OF_A_PLACE } else { NOT_OF_A_NUMBER };
     let mut problem = before.filter(|text| text.ends_with(not_of_it));
     let refused = key.typed().filter(|c| purpose.characters().is_some_and(|allowed| !allowed.contains(*c)));
-    // The selection ends with the first key; one that types or deletes takes the text with it.
+    // The selection ends with the first key that edits; one that types or deletes takes the text with it. A number that was refused is
+    // selected again.
     let takes = key.typed().is_some() || matches!(key.code(), KeyCode::Backspace | KeyCode::Delete);
     if replaces && takes && refused.is_none() {
         input.reset();
@@ -42,6 +43,7 @@ pub(super) fn key(
             return Vec::new();
         }
     }
+    let mut selected = replaces && refused.is_some();
     match key.code() {
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
         KeyCode::Enter if problem.is_some() => {
@@ -55,7 +57,10 @@ pub(super) fn key(
         }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
             Ok(effects) => return effects,
-            Err(reason) => problem = Some(reason),
+            Err(reason) => {
+                problem = Some(reason);
+                selected = purpose.characters().is_some() && !input.value().is_empty();
+            }
         },
         // Where Space is always STOP, a note needs another key for it.
         KeyCode::Char('_') if key.typed().is_some() && model.space_bar_must_stop() && purpose.is_remark() => {
@@ -64,14 +69,14 @@ pub(super) fn key(
         _ => match refused {
             Some(c) => problem = Some(format!("`{c}`{not_of_it}")),
             None => {
-                edit(&mut input, key);
+                let edits = edit(&mut input, key);
+                selected = replaces && !edits;
                 // An emptied field has no number that the missing character could have changed.
                 problem = problem.filter(|_| !input.value().is_empty());
             }
         },
     }
-    let replaces = replaces && refused.is_some();
-    model.dialog = Some(Dialog::Field { purpose, input, replaces, problem });
+    model.dialog = Some(Dialog::Field { purpose, input, replaces: selected, problem });
     Vec::new()
 }
 
