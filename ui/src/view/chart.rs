@@ -361,12 +361,12 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
     phases
 }
 
-/// The columns of a jump's phases, each with its role and its name.
-fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u16, (Role, &'static str))> {
+/// The columns of a jump's phases, each with its role and its names, the shorter one last.
+fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u16, (Role, [&'static str; 2]))> {
     (0..width).zip(phases).filter_map(|(column, phase)| match phase {
-        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, "impulse"))),
-        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, "flight"))),
-        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, "landing"))),
+        Some(Phase::Impulse) => Some((column, (Role::ShadeImpulse, ["impulse", "push"]))),
+        Some(Phase::Flight) => Some((column, (Role::ShadeFlight, ["flight", "air"]))),
+        Some(Phase::Landing) => Some((column, (Role::ShadeLanding, ["landing", "land"]))),
         Some(Phase::Stance) | None => None,
     })
 }
@@ -375,16 +375,11 @@ fn jump_columns(phases: &[Option<Phase>], width: u16) -> impl Iterator<Item = (u
 /// it has a shorter name, or none.
 pub fn draw_phases(buffer: &mut Buffer, area: Rect, phases: &[Option<Phase>], theme: &Theme) {
     let columns: Vec<_> = jump_columns(phases, area.width).collect();
-    let joined = |a: &(u16, (Role, &str)), b: &(u16, (Role, &str))| a.1.1 == b.1.1 && b.0 == a.0 + 1;
+    let joined = |a: &(u16, (Role, [&str; 2])), b: &(u16, (Role, [&str; 2]))| a.1.1 == b.1.1 && b.0 == a.0 + 1;
     for run in columns.chunk_by(joined) {
-        let name = run[0].1.1;
+        let names = run[0].1.1;
         let fits = |text: &&str| run.len() > text.len();
-        let short = match run[0].1.0 {
-            Role::ShadeImpulse => "push",
-            Role::ShadeFlight => "air",
-            _ => "land",
-        };
-        let shown = [name, short].into_iter().find(fits).unwrap_or_default();
+        let shown = names.into_iter().find(fits).unwrap_or_default();
         let begin = if run.len() > 1 { theme.bar() } else { theme.line() };
         let line = theme.line().repeat(run.len() - shown.len() - 1);
         buffer.set_string(area.x + run[0].0, area.y, format!("{begin}{shown}{line}"), theme.style(Role::Quiet));

@@ -75,6 +75,8 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
         spans.push(span(theme, Role::Warning, text));
     }
     spans.push(Span::raw(session.task_name()));
+    // Where the line can end, the least important part last.
+    let mut ends = Vec::new();
     if let Some(info) = model.session.stage {
         let (finished, budget) = (model.session.counted(), model.session.budget());
         let (trial, counted) = match narrow {
@@ -82,23 +84,22 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
             false => (format!("   trial #{}", info.trial), format!("   {finished} of {budget} counted")),
         };
         for part in [trial, counted] {
-            if spans.iter().map(Span::width).sum::<usize>() + part.len() > room {
-                break;
-            }
+            ends.push(spans.len());
             spans.push(Span::raw(part));
         }
     }
     if let Some((best, value)) = model.session.trials.best_value() {
-        let before = spans.len();
+        ends.push(spans.len());
         spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
         let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
         spans.push(span(theme, Role::Good, format!("{} {}{by_hand}", number(value), session.unit)));
+        ends.push(spans.len());
         spans.push(span(theme, Role::Quiet, format!(" (#{best})")));
-        for kept in [before + 2, before] {
-            if spans.iter().map(Span::width).sum::<usize>() > room {
-                spans.truncate(kept);
-            }
-        }
+    }
+    while spans.iter().map(Span::width).sum::<usize>() > room
+        && let Some(end) = ends.pop()
+    {
+        spans.truncate(end);
     }
     Line::from(spans)
 }
