@@ -18,6 +18,7 @@ mod support;
 mod attach;
 mod cell_encoder;
 mod charts;
+mod closing;
 mod command_line;
 mod configuration;
 mod connection;

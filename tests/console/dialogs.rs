@@ -272,7 +272,7 @@ fn lists_say_how_long_they_are_and_that_nothing_matches() {
     console.press(&["End"]);
     assert!(!console.screen(80, 24).contains("(1-"), "{}", console.screen(80, 24));
     console.press(&["Esc", "?"]);
-    assert_shows(&console.next_step(), &["Up Down PgUp PgDn scroll, any other key closes."]);
+    assert_shows(&console.next_step(), &["Up Down PgUp PgDn scroll, Esc Enter q close."]);
 }
 
 #[test]
@@ -322,7 +322,7 @@ fn the_queue_of_a_replay_offers_no_key_that_is_refused() {
     console.press(&["N"]);
     assert_shows(&console.next_step(), &["Left earlier, Right later, x removes"]);
     console.update(Msg::Replay(ReplayStatus::default()));
-    assert_eq!(console.next_step(), "Up Down choose, Enter closes.");
+    assert_eq!(console.next_step(), "Up Down choose, Esc Enter q close.");
 }
 
 /// Regression: the list of actions did not page, and nothing said that it goes on.
@@ -357,11 +357,11 @@ fn the_list_of_series_is_as_wide_as_its_texts() {
 fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
     let mut console = Console::ready();
     console.press(&["N", "z"]);
-    assert_shows(&console.screen(80, 24), &["z does nothing here; Enter does"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Esc Enter q do"]);
     let point = QueuedPoint { trial: 3, source: ProposalSource::Operator, ..QueuedPoint::default() };
     console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
     assert_eq!(console.press(&["z"]), []);
-    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down Left Right x Enter do"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down Left Right x Esc Enter q do"]);
     console.press(&["Esc", "o", "Home"]);
     let keys = "a number, arrows, PgUp PgDn, Enter, Q and Esc do";
     assert_shows(&console.screen(80, 24), &[&format!("Home does nothing here; {keys}")]);
@@ -377,9 +377,9 @@ fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
 fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
     let mut console = Console::proposed();
     for (view, open, keys) in [
-        ("1", "P", "Up Down PgUp PgDn Enter do"),
-        ("1", "T", "Up Down PgUp PgDn Home End x Enter do"),
-        ("2", "x", "Up Down PgUp PgDn Home End x Enter do"),
+        ("1", "P", "Up Down PgUp PgDn Esc Enter q do"),
+        ("1", "T", "Up Down PgUp PgDn Home End x Esc Enter q do"),
+        ("2", "x", "Up Down PgUp PgDn Home End x Esc Enter q do"),
     ] {
         console.press(&[view, open, "z"]);
         assert_shows(&console.screen(80, 24), &[&format!("z does nothing here; {keys}")]);
@@ -387,7 +387,7 @@ fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
     }
     console.model.session.info = SessionInfo { backend: Some(Backend::Hardware), ..session() };
     assert_eq!(console.requests(&["P", "z"]), []);
-    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down x PgUp PgDn Enter do"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down x PgUp PgDn Esc Enter q do"]);
     // Arming that is refused has its reason.
     console.mode(Mode::Ready);
     assert_eq!(console.requests(&["A"]), []);

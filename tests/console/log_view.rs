@@ -47,7 +47,7 @@ fn a_line_opens_whole_and_shows_its_neighbours() {
         assert!(!console.screen(columns, rows).contains("amphibian"), "{columns}");
         console.press(&["Enter"]);
         let screen = console.screen(columns, rows);
-        assert_shows(&screen, &["Line of the log", "amphibian", "warning", "test", "STOP", "any other key closes"]);
+        assert_shows(&screen, &["Line of the log", "amphibian", "warning", "test", "STOP", "Esc Enter q close"]);
         // Words stay whole: each row of the text is a part of it.
         for row in screen.lines().filter_map(|row| row.split_once("│ ").map(|(_, rest)| rest)) {
             let text = row.split("│").next().unwrap_or_default().trim();

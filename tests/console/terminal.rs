@@ -174,7 +174,10 @@ fn resizing_at_any_moment_is_safe() {
         session.send(["1", "2", "3", "4", "5", "6", "?", "\x1b"][usize::from(step) % 8]);
         std::thread::sleep(Duration::from_millis(15));
     }
-    session.send("\x1b1");
+    // Esc and a key that follows at once are a key with Alt.
+    session.send("\x1b");
+    std::thread::sleep(Duration::from_millis(300));
+    session.send("1");
     session.resize(40, 10);
     session.wait_for(&["needed 60x20"]);
     session.resize(80, 24);

@@ -223,6 +223,11 @@ impl Keymap {
         self.keys(action).next().map(|key| key.to_string()).unwrap_or_default()
     }
 
+    /// The keys that close a dialog that only shows something, in words.
+    pub fn closing_keys(&self) -> String {
+        format!("Esc Enter {}", self.key(Action::Quit))
+    }
+
     /// All keys of an action, for example `Space F12`.
     pub fn all_keys(&self, action: Action) -> String {
         self.keys(action).map(|key| key.to_string()).collect::<Vec<_>>().join(" ")

@@ -94,6 +94,13 @@ pub fn areas(size: Size, model: &Model) -> Option<Areas> {
     Some(Areas { frame, tabs, body, timeline, message, next_step })
 }
 
+/// The rows within the borders of the highest dialog.
+pub fn dialog_rows(model: &Model) -> usize {
+    let size = Size::from(model.size);
+    let body = areas(size, model).map(|areas| areas.body).or(compact_areas(size).map(|areas| areas.trial));
+    body.map_or(1, |body| usize::from(body.height.saturating_sub(2)).max(1))
+}
+
 /// The rows of the trial table in view Trials: the body below its heading and the column titles.
 pub fn trial_rows(body: Rect) -> Rect {
     Rect { y: body.y + 2, height: body.height.saturating_sub(2), ..body }

@@ -198,6 +198,28 @@ impl Dialog {
         }
     }
 
+    /// Whether it only shows something, or lists what a key changes at once: it asks nothing.
+    pub fn only_shows(&self) -> bool {
+        match self {
+            Dialog::ArmingChecks { .. }
+            | Dialog::Help { .. }
+            | Dialog::Report { .. }
+            | Dialog::Choose { .. }
+            | Dialog::Queue { .. }
+            | Dialog::Details { .. }
+            | Dialog::LogLine { .. } => true,
+            Dialog::Approve { .. }
+            | Dialog::TakeControl
+            | Dialog::Arm { .. }
+            | Dialog::Confirm(_)
+            | Dialog::Quit
+            | Dialog::Override(_)
+            | Dialog::Field { .. }
+            | Dialog::Export { .. }
+            | Dialog::Palette { .. } => false,
+        }
+    }
+
     /// Whether keys are text here.
     pub fn takes_text(&self) -> bool {
         matches!(self, Dialog::Field { .. } | Dialog::Palette { .. })

@@ -51,6 +51,12 @@ pub(super) fn does_nothing(key: Key, keys: &str) -> String {
     format!("{key} does nothing here; {keys}")
 }
 
+/// Answers a key without a meaning in a dialog that only shows something; `keys` are those that have one, before those that close.
+pub(super) fn unknown_key(model: &mut Model, key: Key, keys: &str) {
+    let all = format!("{keys} {}", model.keymap.closing_keys());
+    say(model, LogLevel::Info, does_nothing(key, &format!("{} do", all.trim_start())));
+}
+
 /// Reports that a dialog ended without effect.
 pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
     say(model, LogLevel::Info, format!("cancelled: {text}"));

@@ -272,6 +272,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
 
 fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     let key = |action| model.keymap.key(action);
+    let close = format!("{} close.", model.keymap.closing_keys());
     let lead = match dialog {
         Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
             format!("Type y if the area is clear (trial #{trial}). Any other key cancels.")
@@ -286,8 +287,8 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::ArmingChecks { .. } => {
             let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
             match model.session.info.is_hardware() {
-                true => format!("Up Down choose, x confirms, PgUp PgDn scroll, Enter closes.{arms}"),
-                false => format!("Up Down scroll, Enter closes.{arms}"),
+                true => format!("Up Down choose, x confirms, PgUp PgDn scroll, {close}{arms}"),
+                false => format!("Up Down PgUp PgDn scroll, {close}{arms}"),
             }
         }
         Dialog::Override(form) if form.typing.is_none() => {
@@ -328,13 +329,13 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
-        Dialog::Choose { .. } => "Up Down choose, x switches it on or off, Enter closes.".to_owned(),
-        Dialog::Queue { .. } if model.session.queue().is_empty() => "Enter closes.".to_owned(),
-        Dialog::Queue { .. } if may_request(model).is_err() => "Up Down choose, Enter closes.".to_owned(),
-        Dialog::Queue { .. } => "Up Down choose, Left earlier, Right later, x removes, Enter closes.".to_owned(),
-        Dialog::Report { .. } | Dialog::Help { .. } => "Up Down PgUp PgDn scroll, any other key closes.".to_owned(),
-        Dialog::Details { .. } => "Up Down other trials, PgUp PgDn scroll, Esc closes.".to_owned(),
-        Dialog::LogLine { .. } => "Up Down other lines, PgUp PgDn scroll, any other key closes.".to_owned(),
+        Dialog::Choose { .. } => format!("Up Down choose, x switches it on or off, {close}"),
+        Dialog::Queue { .. } if model.session.queue().is_empty() => close,
+        Dialog::Queue { .. } if may_request(model).is_err() => format!("Up Down choose, {close}"),
+        Dialog::Queue { .. } => format!("Up Down choose, Left earlier, Right later, x removes, {close}"),
+        Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn scroll, {close}"),
+        Dialog::Details { .. } => format!("Up Down other trials, PgUp PgDn scroll, {close}"),
+        Dialog::LogLine { .. } => format!("Up Down other lines, PgUp PgDn scroll, {close}"),
     };
     NextStep { lead, others: Vec::new() }
 }

@@ -14,7 +14,7 @@ use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Purpose, Question};
 use crate::update::perform::queued_values;
-use crate::update::request::{cancelled, does_nothing, refused, request, say};
+use crate::update::request::{cancelled, refused, request, say, unknown_key};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
 const CHECKS_PAGE: usize = 8;
@@ -146,7 +146,7 @@ pub(super) fn quit_key(model: &mut Model, key: Key) -> Vec<Effect> {
 
 /// Arming, from the list that shows whether it is possible.
 pub(super) fn action_over_checks(model: &Model, key: Key) -> Option<Action> {
-    let taken = matches!(key.code(), KeyCode::Esc | KeyCode::Enter | KeyCode::Up | KeyCode::Down | KeyCode::Char('x'));
+    let taken = matches!(key.code(), KeyCode::Up | KeyCode::Down | KeyCode::Char('x'));
     let arms = !taken && model.keymap.action(key) == Some(Action::Arm) && legal(Action::Arm, model).is_ok();
     arms.then_some(Action::Arm)
 }
@@ -169,7 +169,6 @@ pub(super) fn arming_checks_key(
     let simulated = !model.session.info.is_hardware();
     let mut effects = Vec::new();
     match key.code() {
-        KeyCode::Esc | KeyCode::Enter => return effects,
         // In simulation nothing is confirmed, so that nothing is chosen.
         KeyCode::Up if simulated => scroll = scroll.saturating_sub(1).max(1),
         KeyCode::Down if simulated => scroll = (scroll.max(1) + 1).min(CHECKS_LINES),
@@ -192,8 +191,8 @@ pub(super) fn arming_checks_key(
             }
         }
         _ => {
-            let keys = if simulated { "Up Down PgUp PgDn Enter do" } else { "Up Down x PgUp PgDn Enter do" };
-            say(model, LogLevel::Info, does_nothing(key, keys));
+            let keys = if simulated { "Up Down PgUp PgDn" } else { "Up Down x PgUp PgDn" };
+            unknown_key(model, key, keys);
         }
     }
     model.dialog = Some(Dialog::ArmingChecks { selected, scroll });

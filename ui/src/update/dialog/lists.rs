@@ -1,7 +1,6 @@
 //! Keys of the lists: palette, help, switches, details of a trial.
 
 use crossterm::event::KeyCode;
-use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use strum::VariantArray;
 use tui_input::Input;
@@ -9,13 +8,14 @@ use tui_input::Input;
 use super::text_field::edit;
 use crate::action::Action;
 use crate::keymap::Key;
+use crate::layout::dialog_rows;
 use crate::legal::{may_request, palette};
 use crate::message::Effect;
 use crate::model::dialog::{Choice, Dialog, Question};
 use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
-use crate::update::request::{cancelled, does_nothing, refused, request, say};
+use crate::update::request::{cancelled, refused, request, unknown_key};
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -58,31 +58,34 @@ pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut sel
 }
 
 pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect> {
-    if let Some(scroll) = scrolled(model, key, scroll) {
-        model.dialog = Some(Dialog::Help { scroll });
-    }
+    let scroll = scrolled(model, key, scroll, "Up Down PgUp PgDn Home");
+    model.dialog = Some(Dialog::Help { scroll });
     Vec::new()
 }
 
 pub(super) fn report_key(model: &mut Model, key: Key, lines: Vec<String>, scroll: usize) -> Vec<Effect> {
-    let scroll = if key.code() == KeyCode::End { Some(lines.len()) } else { scrolled(model, key, scroll) };
-    if let Some(scroll) = scroll {
-        let scroll = scroll.min(lines.len().saturating_sub(1));
-        model.dialog = Some(Dialog::Report { lines, scroll });
-    }
+    let last = lines.len().saturating_sub(dialog_rows(model));
+    let scroll = match key.code() {
+        KeyCode::End => last,
+        _ => scrolled(model, key, scroll, "Up Down PgUp PgDn Home End").min(last),
+    };
+    model.dialog = Some(Dialog::Report { lines, scroll });
     Vec::new()
 }
 
-/// Returns the lines above the shown ones after a key; none for a key that does not scroll.
-fn scrolled(model: &Model, key: Key, scroll: usize) -> Option<usize> {
+/// Returns the lines above the shown ones after a key; one that does not scroll is answered with those that do.
+fn scrolled(model: &mut Model, key: Key, scroll: usize, keys: &str) -> usize {
     let page = model.page.max(2) - 1;
     match key.code() {
-        KeyCode::Up => Some(scroll.saturating_sub(1)),
-        KeyCode::Down => Some(scroll + 1),
-        KeyCode::PageUp => Some(scroll.saturating_sub(page)),
-        KeyCode::PageDown => Some(scroll + page),
-        KeyCode::Home => Some(0),
-        _ => None,
+        KeyCode::Up => scroll.saturating_sub(1),
+        KeyCode::Down => scroll + 1,
+        KeyCode::PageUp => scroll.saturating_sub(page),
+        KeyCode::PageDown => scroll + page,
+        KeyCode::Home => 0,
+        _ => {
+            unknown_key(model, key, keys);
+            scroll
+        }
     }
 }
 
@@ -90,7 +93,6 @@ fn scrolled(model: &Model, key: Key, scroll: usize) -> Option<usize> {
 pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selected: usize) -> Vec<Effect> {
     let last = model.choices(subject).len().saturating_sub(1);
     match key.code() {
-        KeyCode::Esc | KeyCode::Enter => return Vec::new(),
         KeyCode::Up => selected = selected.saturating_sub(1),
         KeyCode::Down => selected = (selected + 1).min(last),
         KeyCode::PageUp => selected = selected.saturating_sub(model.page),
@@ -104,7 +106,7 @@ pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selec
             }
             Choice::Columns => toggle(&mut model.trial_table.columns, selected),
         },
-        _ => say(model, LogLevel::Info, does_nothing(key, "Up Down PgUp PgDn Home End x Enter do")),
+        _ => unknown_key(model, key, "Up Down PgUp PgDn Home End x"),
     }
     model.dialog = Some(Dialog::Choose { subject, selected });
     Vec::new()
@@ -143,14 +145,13 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
             model.dialog = Some(Dialog::Confirm(Question::RemoveQueued { trial }));
             return Vec::new();
         }
-        (KeyCode::Esc | KeyCode::Enter, _) => return Vec::new(),
         _ => {
             let keys = match may_request(model) {
-                _ if trial.is_none() => "Enter does",
-                Ok(()) => "Up Down Left Right x Enter do",
-                Err(_) => "Up Down Enter do",
+                _ if trial.is_none() => "",
+                Ok(()) => "Up Down Left Right x",
+                Err(_) => "Up Down",
             };
-            say(model, LogLevel::Info, does_nothing(key, keys));
+            unknown_key(model, key, keys);
             (selected, None)
         }
     };
@@ -172,7 +173,10 @@ pub(super) fn log_line_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Ef
         KeyCode::PageUp => scroll.saturating_sub(LOG_PAGE),
         // The longest text of a line fills fewer pages.
         KeyCode::PageDown => (scroll + LOG_PAGE).min(20 * LOG_PAGE),
-        _ => return Vec::new(),
+        _ => {
+            unknown_key(model, key, "Up Down PgUp PgDn");
+            scroll
+        }
     };
     model.dialog = Some(Dialog::LogLine { scroll });
     Vec::new()
@@ -181,7 +185,7 @@ pub(super) fn log_line_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Ef
 /// The action of a key over the details: verdicts and others work while the details are read.
 pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
     match key.code() {
-        KeyCode::PageUp | KeyCode::PageDown | KeyCode::Up | KeyCode::Down | KeyCode::Esc | KeyCode::Enter => None,
+        KeyCode::PageUp | KeyCode::PageDown | KeyCode::Up | KeyCode::Down => None,
         _ => model.keymap.action(key),
     }
 }
@@ -194,7 +198,11 @@ pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize
         KeyCode::PageDown => (None, (scroll + DETAILS_PAGE).min(DETAILS_PAGE * 2)),
         KeyCode::Up => (records.range(..trial).next_back(), 0),
         KeyCode::Down => (records.range(trial + 1..).next(), 0),
-        _ => return Vec::new(),
+        _ => {
+            unknown_key(model, key, "Up Down PgUp PgDn");
+            model.dialog = Some(Dialog::Details { trial, scroll });
+            return Vec::new();
+        }
     };
     let trial = neighbour.map_or(trial, |(number, _)| *number);
     if matches!(key.code(), KeyCode::Up | KeyCode::Down) {

@@ -5,6 +5,8 @@ mod lists;
 mod override_form;
 mod text_field;
 
+use crossterm::event::KeyCode;
+
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::Effect;
@@ -21,6 +23,9 @@ pub(super) enum KeyOutcome {
 
 /// One key while `dialog`, which was taken out of the model, is open. STOP and Ctrl-C were handled before.
 pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
+    if dialog.only_shows() && closes(model, key) {
+        return KeyOutcome::Effects(Vec::new());
+    }
     let action = match &dialog {
         Dialog::ArmingChecks { .. } => confirm::action_over_checks(model, key),
         Dialog::Palette { input, selected } => lists::chosen_action(model, key, input.value(), *selected),
@@ -52,4 +57,9 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         Dialog::Details { trial, scroll } => lists::details_key(model, key, trial, scroll),
         Dialog::LogLine { scroll } => lists::log_line_key(model, key, scroll),
     })
+}
+
+/// Whether a key closes a dialog that only shows something: Esc, Enter, and the key that quits elsewhere.
+fn closes(model: &Model, key: Key) -> bool {
+    matches!(key.code(), KeyCode::Esc | KeyCode::Enter) || model.keymap.action(key) == Some(Action::Quit)
 }
