@@ -1,7 +1,8 @@
 //! One rule for the keys that close a dialog, and for the time of an answer in the message line.
 
 use crate::support::{Console, assert_shows, trial};
-use quadfrog::recording::record::Record;
+use quadfrog::recording::record::{LogLevel, LogRecord, Record};
+use quadfrog::telemetry::Mode;
 use quadfrog::trial::Verdict;
 use quadfrog_console::keymap::Keymap;
 use quadfrog_console::message::{Msg, ReplayStatus};
@@ -71,4 +72,54 @@ fn the_key_chosen_for_quitting_closes_too_and_is_named() {
     assert_shows(&console.next_step(), &["Esc Enter Ctrl-T close."]);
     assert_eq!(console.press(&["Ctrl-T"]), []);
     assert!(console.model.dialog.is_none());
+}
+
+/// Regression: an answer stayed for minutes, and came back when a dialog or another view had been closed.
+#[test]
+fn an_answer_goes_with_the_next_key_that_has_an_effect_and_does_not_come_back() {
+    for effect in [&["2"][..], &["R"], &["?", "Esc"], &["Ctrl-L"], &["Down"], &["t"], &["2", "1"]] {
+        let mut console = Console::ready();
+        console.press(&["W"]);
+        let text = "colours for a light background";
+        assert_eq!(console.said(), text);
+        console.press(effect);
+        assert_ne!(console.said(), text, "{effect:?}");
+        assert!(!console.screen(80, 24).contains(&format!(" {text}\n")), "{effect:?}");
+        console.press(&["2", "1"]);
+        assert!(!console.screen(80, 24).contains(&format!(" {text}\n")), "{effect:?}");
+    }
+    // The answer of the session to a request, too.
+    let mut console = Console::ready();
+    console.answer("override Fx = 120", true, "done");
+    assert_eq!(console.said(), "override Fx = 120: done");
+    console.press(&["2"]);
+    assert_eq!(console.said(), "");
+}
+
+#[test]
+fn an_answer_goes_after_its_time_and_a_report_of_the_session_stays() {
+    let mut console = Console::ready();
+    console.press(&["W"]);
+    console.wait(14_000);
+    assert_eq!(console.said(), "colours for a light background");
+    console.wait(1_000);
+    assert_eq!(console.said(), "");
+    let slow = LogRecord { level: LogLevel::Warning, source: "recorder".into(), message: "the disk is slow".into() };
+    console.record(Record::Log(slow));
+    console.press(&["2", "1"]);
+    console.wait(120_000);
+    assert_shows(&console.screen(80, 24), &["2 min ago: the disk is slow"]);
+}
+
+/// The first answer to a key that was pressed twice stays: the second press has no effect.
+#[test]
+fn a_key_without_an_effect_leaves_the_answer() {
+    let mut console = Console::review(Mode::Ready, Verdict::Accept);
+    console.press(&["a"]);
+    console.answer("accept trial 0", true, "");
+    console.press(&["a"]);
+    assert_eq!(console.said(), "accept trial 0");
+    // Nothing is beside another.
+    console.press(&["Esc"]);
+    assert_eq!(console.said(), "accept trial 0");
 }

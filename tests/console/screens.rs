@@ -2,7 +2,7 @@
 
 use crate::support;
 use crate::support::{Console, VIEWS, assert_shows, line_with, tick, trial};
-use quadfrog::recording::record::{LogLevel, Record};
+use quadfrog::recording::record::{LogLevel, LogRecord, Record};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{ExperimentStage, Verdict};
 use quadfrog_console::message::{Msg, ReplayStatus};
@@ -221,17 +221,18 @@ fn without_colours_no_cell_is_coloured() {
     }
 }
 
-/// Regression: an answer of twenty minutes ago looked like the newest event.
+/// Regression: a report of twenty minutes ago looked like the newest event.
 #[test]
-fn an_old_answer_is_grey_and_has_its_age() {
+fn an_old_report_is_grey_and_has_its_age() {
     let mut console = Console::ready();
-    console.answer("skip the proposal", true, "skipped");
-    let shown = |console: &Console| line_with(&console.screen(80, 24), "skipped");
-    assert_eq!(shown(&console).trim(), "skip the proposal: skipped");
+    let slow = LogRecord { level: LogLevel::Warning, source: "recorder".into(), message: "the disk is slow".into() };
+    console.record(Record::Log(slow));
+    let shown = |console: &Console| line_with(&console.screen(80, 24), "the disk");
+    assert_eq!(shown(&console).trim(), "the disk is slow");
     console.wait(59_000);
-    assert_eq!(shown(&console).trim(), "skip the proposal: skipped");
+    assert_eq!(shown(&console).trim(), "the disk is slow");
     console.wait(125_000);
-    assert_eq!(shown(&console).trim(), "3 min ago: skip the proposal: skipped");
+    assert_eq!(shown(&console).trim(), "3 min ago: the disk is slow");
     let (buffer, row) = (console.draw(80, 24), 22);
     assert_eq!(buffer[(1, row)].modifier, console.model.theme.style(Role::Quiet).add_modifier);
 }

@@ -31,7 +31,7 @@ use crate::picture::PictureSchedule;
 use crate::settings::{ChartMode, ConsoleSettings};
 use crate::terminal::{self, TerminalProtocol, TerminalScreen};
 use crate::theme::{ColourChoice, GlyphChoice, Theme, ThemeChoice};
-use crate::update::{say, update};
+use crate::update::{reply, say, update};
 use crate::{export, text, view};
 
 /// Maximum period of the loop and of the operator heartbeat.
@@ -361,7 +361,7 @@ impl Console {
 
     fn say_written(&mut self, written: anyhow::Result<PathBuf>, text: impl FnOnce(&Path) -> String) {
         match written {
-            Ok(path) => say(&mut self.model, LogLevel::Info, text(&path)),
+            Ok(path) => reply(&mut self.model, LogLevel::Info, text(&path)),
             Err(error) => say(&mut self.model, LogLevel::Error, format!("not written: {error}")),
         }
     }

@@ -49,7 +49,7 @@ use trials::TrialTable;
 /// Torque of a joint at rest that damping leaves: friction and the error of the motor's estimate, N m.
 const DAMPED_TORQUE_N_M: f64 = 2.0;
 
-/// Time after which an answer is no news any more.
+/// Time after which an answer goes, and a report of the session is no news any more.
 const NEWS_TIME: Duration = Duration::from_secs(15);
 
 /// Tilt of a robot that no longer lies on its belly, rad: half a right angle.
@@ -82,7 +82,7 @@ pub struct Notice {
     pub text: String,
     /// Whether it answers the STOP key.
     pub stop: bool,
-    /// Whether it answers a request or a key: it says nothing that still holds later.
+    /// Whether it answers a request or a key: it goes with the next key that has an effect, or after its time.
     pub answer: bool,
     /// When it was shown, on the console's clock.
     pub at: Duration,

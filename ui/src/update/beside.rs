@@ -2,7 +2,7 @@
 
 use quadfrog::recording::record::LogLevel;
 
-use super::request::say;
+use super::request::reply;
 use crate::action::Action;
 use crate::message::{Effect, ReplayCommand, ReplayStatus, SideBySide};
 use crate::model::comparison::Comparison;
@@ -17,7 +17,7 @@ pub(super) fn begin(model: &mut Model) -> Vec<Effect> {
     let selected = model.selected_trial().map(|trial| trial.trial).filter(|trial| Some(*trial) != present);
     if let Some(trial) = selected.filter(|_| model.view == View::Trials && one_recording) {
         return chosen(model, trial).unwrap_or_else(|reason| {
-            say(model, LogLevel::Warning, reason);
+            reply(model, LogLevel::Warning, reason);
             Vec::new()
         });
     }
@@ -54,7 +54,7 @@ pub(super) fn show(model: &mut Model, both: &SideBySide) {
         let place = if both.b.recording.is_some() { " of the second recording" } else { "" };
         let end = model.keymap.key(Action::EndComparison);
         let text = format!("A is trial {}, B is trial {}{place}; {end} ends it", both.a.trial, both.b.trial);
-        say(model, LogLevel::Info, text);
+        reply(model, LogLevel::Info, text);
     }
     model.live.ghost = None;
     model.live.comparison = Some(comparison);

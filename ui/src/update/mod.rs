@@ -28,9 +28,9 @@ use crate::model::session::SessionModel;
 use crate::settings::BellCause;
 use dialog::KeyOutcome;
 use perform::perform;
-use request::{does_nothing, expire_interrupt, interrupt, request, stop};
+use request::{does_nothing, drop_answer, expire_answer, expire_interrupt, interrupt, request, stop};
 
-pub use request::say;
+pub use request::{reply, say};
 
 /// Folds one message into the model.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -51,6 +51,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Clock(now) => {
             model.clock = now;
             expire_interrupt(model);
+            expire_answer(model);
             records::show_fault_again(model);
         }
         Msg::Resize(columns, rows) => {
@@ -85,7 +86,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.replay = Some(status);
         }
         Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
-        Msg::Answer(text) => say(model, LogLevel::Info, text),
+        Msg::Answer(text) => reply(model, LogLevel::Info, text),
         Msg::Rejudged(news) => rejudged::apply(model, news),
         Msg::SideBySide(both) => beside::show(model, &both),
         Msg::Timeline(timeline) => model.timeline = Some(timeline),
@@ -123,9 +124,11 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
     if model.mode() == Mode::Countdown && may_request(model).is_ok() {
         model.dialog = None;
+        drop_answer(model);
         return request(model, OperatorRequest::Cancel);
     }
     if let Some(dialog) = model.dialog.take() {
+        drop_answer(model);
         return match dialog::key(model, dialog, key) {
             KeyOutcome::Effects(effects) => effects,
             KeyOutcome::Perform(action) => perform(model, action),
@@ -135,7 +138,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
         Some(action) => perform(model, action),
         None => {
             let help = model.keymap.key(Action::Help);
-            say(model, LogLevel::Info, does_nothing(key, &format!("{help} shows the keys")));
+            reply(model, LogLevel::Info, does_nothing(key, &format!("{help} shows the keys")));
             Vec::new()
         }
     }

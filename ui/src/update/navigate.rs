@@ -6,7 +6,7 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::Verdict;
 use strum::VariantArray;
 
-use super::request::say;
+use super::request::reply;
 use crate::action::Action;
 use crate::column::Column;
 use crate::message::ComparedTrial;
@@ -83,13 +83,13 @@ pub(super) fn freeze(model: &mut Model) {
     let key = model.keymap.key(Action::Freeze);
     if let Some(trial) = landed {
         model.live.present_in_review = true;
-        say(model, LogLevel::Info, format!("the charts show the present; {key} shows trial {trial} again"));
+        reply(model, LogLevel::Info, format!("the charts show the present; {key} shows trial {trial} again"));
         return;
     }
     if model.live.present_in_review && model.live.frozen.is_none() && reviewed.is_some() {
         model.live.present_in_review = false;
         if let Some(trial) = model.landed().map(|landed| landed.trial) {
-            say(model, LogLevel::Info, format!("the charts show trial {trial}; {key} shows the present"));
+            reply(model, LogLevel::Info, format!("the charts show trial {trial}; {key} shows the present"));
             return;
         }
     }
@@ -101,14 +101,14 @@ pub(super) fn freeze(model: &mut Model) {
             format!("the charts are frozen; {key} shows the present")
         }
     };
-    say(model, LogLevel::Info, text);
+    reply(model, LogLevel::Info, text);
 }
 
 pub(super) fn zoom(model: &mut Model, factor: f64) {
     if let Some(trial) = model.landed().map(|landed| landed.trial) {
         let key = model.keymap.key(Action::Freeze);
         let text = format!("trial {trial} is fitted to the charts; {key} returns to the present, which can be zoomed");
-        say(model, LogLevel::Info, text);
+        reply(model, LogLevel::Info, text);
         return;
     }
     model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
@@ -126,7 +126,7 @@ pub(super) fn ghost(model: &mut Model) {
         (_, None, false) => first_ghost(model, model.session.trials.best().map(|trial| trial.trial)),
         _ => no_ghost(model),
     };
-    say(model, LogLevel::Info, text);
+    reply(model, LogLevel::Info, text);
 }
 
 pub(super) fn no_ghost(model: &mut Model) -> String {

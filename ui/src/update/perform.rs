@@ -12,7 +12,7 @@ use strum::VariantArray;
 use super::beside;
 use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, no_ghost, zoom};
 use super::rejudged;
-use super::request::{interrupt, reply, request, say, stop};
+use super::request::{drop_answer, interrupt, reply, request, stop};
 use crate::action::Action;
 use crate::legal::{legal, may_request};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
@@ -48,6 +48,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         return Vec::new();
     }
+    drop_answer(model);
     match action {
         Action::Stop => return stop(model),
         Action::Interrupt => return interrupt(model),
@@ -164,7 +165,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Search => open(model, Dialog::field(Purpose::TrialNumber, "")),
         Action::Copy => {
             if let Some(trial) = model.selected_trial().map(|trial| trial.trial) {
-                say(
+                reply(
                     model,
                     LogLevel::Info,
                     "the row was sent to the clipboard of your terminal (OSC 52), if it has one",
@@ -201,7 +202,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Beside => return beside::begin(model),
         Action::EndComparison => {
             no_ghost(model);
-            say(model, LogLevel::Info, "no trial is beside another any longer");
+            reply(model, LogLevel::Info, "no trial is beside another any longer");
             return beside::ended(model);
         }
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
@@ -217,7 +218,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
                 Background::Light => (Background::Dark, "colours for a dark background"),
             };
             model.theme.background = background;
-            say(model, LogLevel::Info, text);
+            reply(model, LogLevel::Info, text);
             return vec![Effect::Redraw];
         }
         Action::Mouse => {
@@ -226,11 +227,11 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
                 true => "mouse on: tabs, rows, wheel; Shift while dragging selects text in most terminals",
                 false => "mouse off: your terminal selects and copies text",
             };
-            say(model, LogLevel::Info, text);
+            reply(model, LogLevel::Info, text);
             return vec![Effect::Mouse(model.mouse)];
         }
         Action::Redraw => {
-            say(model, LogLevel::Info, "the screen was drawn again");
+            reply(model, LogLevel::Info, "the screen was drawn again");
             return vec![Effect::Redraw];
         }
         Action::Suspend => return vec![Effect::Suspend],
@@ -294,7 +295,7 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     if model.view == View::Log {
         match model.log_view.selected(&model.session.log) {
             Some(_) => open(model, Dialog::LogLine { scroll: 0 }),
-            None => say(model, LogLevel::Info, "the log has no line"),
+            None => reply(model, LogLevel::Info, "the log has no line"),
         }
         return Vec::new();
     }
@@ -303,7 +304,7 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     } else if let Some(trial) = model.trial_in_view().map(|trial| trial.trial) {
         open(model, Dialog::Details { trial, scroll: 0 });
     } else {
-        say(model, LogLevel::Info, "there is no trial yet");
+        reply(model, LogLevel::Info, "there is no trial yet");
     }
     Vec::new()
 }

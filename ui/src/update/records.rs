@@ -57,7 +57,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         cancelled(model, &format!("no jump, the question was {} s old", APPROVAL_TIME.as_secs()));
     } else if stale {
         model.dialog = None;
-        say(model, LogLevel::Warning, "the question was closed: the situation has changed");
+        reply(model, LogLevel::Warning, "the question was closed: the situation has changed");
     }
 }
 

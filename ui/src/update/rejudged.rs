@@ -2,7 +2,7 @@
 
 use quadfrog::recording::record::LogLevel;
 
-use super::request::say;
+use super::request::{reply, say};
 use crate::message::{Effect, RejudgeNews};
 use crate::model::dialog::{Dialog, Purpose};
 use crate::model::rejudged::RejudgedTable;
@@ -11,7 +11,7 @@ use crate::model::{Model, View};
 /// Asks for the configuration; where the trials are judged again already, removes the new judgements.
 pub(super) fn toggle(model: &mut Model) -> Vec<Effect> {
     if model.rejudged.take().is_some() {
-        say(model, LogLevel::Info, "the recorded judgements alone");
+        reply(model, LogLevel::Info, "the recorded judgements alone");
         return vec![Effect::EndRejudge];
     }
     model.dialog = Some(Dialog::field(Purpose::Rejudge, ""));
@@ -36,7 +36,7 @@ pub(super) fn apply(model: &mut Model, news: RejudgeNews) {
         (RejudgeNews::Done, Some(table)) => {
             table.done = true;
             let text = format!("judged again by {}: {}", table.configuration, table.summary());
-            say(model, LogLevel::Info, text);
+            reply(model, LogLevel::Info, text);
         }
         (RejudgeNews::Failed(reason), _) => {
             model.rejudged = None;

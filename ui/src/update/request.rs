@@ -30,14 +30,25 @@ pub(super) fn expire_interrupt(model: &mut Model) {
     }
 }
 
-/// Shows a line to the operator.
+/// Reports something of the session to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
     model.message = Some(Notice { level, text: text.into(), stop: false, answer: false, at: model.clock });
 }
 
-/// Answers a request or a key of the operator.
-pub(super) fn reply(model: &mut Model, level: LogLevel, text: impl Into<String>) {
+/// Answers a request or a key of the operator: until the next key that has an effect, at most for the time of an answer.
+pub fn reply(model: &mut Model, level: LogLevel, text: impl Into<String>) {
     model.message = Some(Notice { level, text: text.into(), stop: false, answer: true, at: model.clock });
+}
+
+/// Removes the answer to an earlier key.
+pub(super) fn drop_answer(model: &mut Model) {
+    model.message.take_if(|message| message.answer);
+}
+
+/// Removes an answer whose time is over.
+pub(super) fn expire_answer(model: &mut Model) {
+    let clock = model.clock;
+    model.message.take_if(|message| message.answer && message.is_old(clock));
 }
 
 /// Answers the STOP key.
@@ -54,12 +65,12 @@ pub(super) fn does_nothing(key: Key, keys: &str) -> String {
 /// Answers a key without a meaning in a dialog that only shows something; `keys` are those that have one, before those that close.
 pub(super) fn unknown_key(model: &mut Model, key: Key, keys: &str) {
     let all = format!("{keys} {}", model.keymap.closing_keys());
-    say(model, LogLevel::Info, does_nothing(key, &format!("{} do", all.trim_start())));
+    reply(model, LogLevel::Info, does_nothing(key, &format!("{} do", all.trim_start())));
 }
 
 /// Reports that a dialog ended without effect.
 pub(super) fn cancelled(model: &mut Model, text: &str) -> Vec<Effect> {
-    say(model, LogLevel::Info, format!("cancelled: {text}"));
+    reply(model, LogLevel::Info, format!("cancelled: {text}"));
     Vec::new()
 }
 
@@ -87,7 +98,7 @@ pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect
 pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
     match model.observer() {
         Some(observer) if observer.ended => {
-            say(model, LogLevel::Error, "the session has ended: its robot cannot be stopped from here");
+            reply(model, LogLevel::Error, "the session has ended: its robot cannot be stopped from here");
             return Vec::new();
         }
         Some(_) => {
@@ -97,7 +108,7 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
         None => {}
     }
     if model.replay.is_some() {
-        say(model, LogLevel::Info, "this is a replay: there is no robot to stop");
+        reply(model, LogLevel::Info, "this is a replay: there is no robot to stop");
         return Vec::new();
     }
     let dropped = matches!(&model.dialog, Some(Dialog::Override(form)) if form.is_changed());
@@ -122,7 +133,7 @@ pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
     }
     let effects = stop(model);
     match effects.is_empty() {
-        true => say(model, LogLevel::Warning, AGAIN_QUITS),
+        true => reply(model, LogLevel::Warning, AGAIN_QUITS),
         false => say_stop(model, &format!("STOP: damping. {AGAIN_QUITS}")),
     }
     effects

@@ -14,7 +14,7 @@ use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, Purpose, Question};
 use crate::update::perform::queued_values;
-use crate::update::request::{cancelled, refused, request, say, unknown_key};
+use crate::update::request::{cancelled, refused, reply, request, unknown_key};
 
 /// Lines that a page of the arming checks moves by, and the most that they can have.
 const CHECKS_PAGE: usize = 8;
@@ -41,12 +41,12 @@ pub(super) fn approve_key(
         return cancelled(model, "no jump");
     }
     if area_asked {
-        say(model, LogLevel::Warning, "not yet: type y first if the area is clear");
+        reply(model, LogLevel::Warning, "not yet: type y first if the area is clear");
     }
     if area_asked || waited < APPROVAL_PAUSE {
         if !area_asked {
             let pause_s = APPROVAL_PAUSE.as_secs_f64();
-            say(model, LogLevel::Info, format!("that {key} came within {pause_s:.1} s and did not count"));
+            reply(model, LogLevel::Info, format!("that {key} came within {pause_s:.1} s and did not count"));
         }
         model.dialog = Some(Dialog::Approve { trial, revision, pressed_at: model.clock, area_clear });
         return Vec::new();
@@ -173,7 +173,7 @@ pub(super) fn arming_checks_key(
         KeyCode::Up if simulated => scroll = scroll.saturating_sub(1).max(1),
         KeyCode::Down if simulated => scroll = (scroll.max(1) + 1).min(CHECKS_LINES),
         KeyCode::Char('x') if simulated => {
-            say(model, LogLevel::Info, "the simulator needs no confirmation");
+            reply(model, LogLevel::Info, "the simulator needs no confirmation");
         }
         KeyCode::Up => (selected, scroll) = (selected.saturating_sub(1), 0),
         KeyCode::Down => (selected, scroll) = ((selected + 1).min(last), 0),

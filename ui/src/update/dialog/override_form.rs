@@ -11,7 +11,7 @@ use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
 use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
-use crate::update::request::{cancelled, does_nothing, request, say};
+use crate::update::request::{cancelled, does_nothing, reply, request};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
     match row.gain {
@@ -77,7 +77,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             let changed = form.rows.iter().filter(|row| row.value != row.before);
             let requests: Vec<OperatorRequest> = changed.map(override_request).collect();
             if requests.is_empty() {
-                say(model, LogLevel::Info, "no value was changed: the proposal stays as it is");
+                reply(model, LogLevel::Info, "no value was changed: the proposal stays as it is");
                 return Vec::new();
             }
             return requests.into_iter().flat_map(|each| request(model, each)).collect();
