@@ -33,6 +33,7 @@ mod keys;
 mod live_view;
 mod log_view;
 mod looks;
+mod narrow;
 mod near_robot;
 mod operator_mistakes;
 mod optuna_versions;

@@ -7,27 +7,56 @@ use super::draw::{number, span};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// A line for each repeated point, best mean first; narrow ones leave words out.
+/// Columns from which a line names its numbers itself; narrower ones stand below a line that does.
+pub const WORDS_FROM: usize = 40;
+
+/// Columns of mean, standard deviation and the space behind them in a narrow line.
+const MEAN_WIDTH: usize = 14;
+
+/// A line for each repeated point, best mean first; in few columns below a line that names the numbers.
 pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
     let mut points: Vec<&PointRecord> = session.trials.points.iter().filter(|point| !point.trials.is_empty()).collect();
     points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    points.into_iter().map(|point| line(session, theme, point, width)).collect()
+    if width >= WORDS_FROM {
+        return points.into_iter().map(|point| line(session, theme, point)).collect();
+    }
+    let names = points.first().map(|_| {
+        let leads = if points.iter().any(|point| point.confidence.is_some()) { "leads" } else { "" };
+        let mean = format!("mean, std {}", session.info.unit);
+        let names = format!(" {:<4}{:<7}{mean:<MEAN_WIDTH$}{leads}", "#", "landed");
+        Line::from(span(theme, Role::Quiet, names.trim_end()))
+    });
+    names.into_iter().chain(points.into_iter().map(|point| narrow_line(theme, point))).collect()
 }
 
-fn line(session: &SessionModel, theme: &Theme, point: &PointRecord, width: usize) -> Line<'static> {
+/// A line below the names of its numbers.
+fn narrow_line(theme: &Theme, point: &PointRecord) -> Line<'static> {
+    let first = point.trials.first().map_or(String::new(), |trial| format!("#{trial}"));
+    let landed = format!("{}/{}", point.without_fall, point.trials.len());
+    let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
+    let mean = number(point.mean);
+    let room = MEAN_WIDTH.saturating_sub(mean.chars().count());
+    let confidence = point.confidence.map_or(String::new(), |confidence| format!("{:.0} %", confidence * 100.0));
+    Line::from(vec![
+        span(theme, Role::Quiet, format!(" {first:<4}")),
+        Span::raw(format!("{landed:<7}{mean}")),
+        span(theme, Role::Quiet, format!("{spread:<room$}")),
+        span(theme, Role::Good, confidence),
+    ])
+}
+
+fn line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Line<'static> {
     let first = point.trials.first().copied().unwrap_or(0);
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
-    let landed = if width < 40 { "" } else { " landed" };
     let mut spans = vec![
         span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
-        Span::raw(format!("{}/{}{landed} ", point.without_fall, point.trials.len())),
+        Span::raw(format!("{}/{} landed ", point.without_fall, point.trials.len())),
         Span::raw(format!(" {} {}", number(point.mean), session.info.unit)),
         span(theme, Role::Quiet, spread),
     ];
     if let Some(confidence) = point.confidence {
-        let leads = if width < 40 { " " } else { "  leads, " };
-        spans.push(span(theme, Role::Good, format!("{leads}{:.0} %", confidence * 100.0)));
-    } else if point.contender && width >= 40 {
+        spans.push(span(theme, Role::Good, format!("  leads, {:.0} %", confidence * 100.0)));
+    } else if point.contender {
         let state = if is_decided(session) { "  behind" } else { "  contends" };
         spans.push(span(theme, Role::Quiet, state));
     }

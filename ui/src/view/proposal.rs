@@ -195,9 +195,11 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
         [Span::raw(" "), span(theme, Role::Key, key), span(theme, Role::Quiet, text)]
     };
     let offers: Vec<_> = offers.into_iter().filter(|(action, _)| legal(*action, model).is_ok()).collect();
-    if !offers.is_empty() {
+    let repeated = points::lines(session, theme, width);
+    // The last line of the screen names these keys, too: in few columns their row is that of the points.
+    if !offers.is_empty() && (width >= points::WORDS_FROM || repeated.is_empty()) {
         lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
     }
-    lines.extend(points::lines(session, theme, width));
+    lines.extend(repeated);
     lines
 }

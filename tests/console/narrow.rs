@@ -1,0 +1,45 @@
+//! Texts of 80 columns and 24 rows that a reader without the manual understands.
+
+use crate::support::{Console, assert_shows, line_with, session, trial};
+use quadfrog::recording::record::Record;
+use quadfrog::trial::{ExperimentStage, PointRecord, Verdict};
+
+/// A finished study with two points that were repeated.
+fn repeated(unit: &str, confidence: Option<f64>) -> Console {
+    let mut console = Console::ready();
+    let mut info = session();
+    info.unit = unit.to_owned();
+    console.record(Record::Session(info));
+    console.record(Record::Trial(trial(12, Some(Verdict::Accept), None)));
+    console.stage(ExperimentStage::Finished, 20);
+    let point = |trials: Vec<u32>, without_fall, mean, confidence| PointRecord {
+        parameters: vec![("f0".into(), 1.25)].into(),
+        trials,
+        without_fall,
+        mean,
+        deviation: Some(0.05),
+        contender: true,
+        confidence,
+    };
+    console.record(Record::Points(vec![
+        point(vec![12, 20], 2, 0.442, confidence),
+        point((30..40).collect(), 9, -0.41, None),
+    ]));
+    console
+}
+
+/// Regression: `2/2  0.442 m ±0.000` stood below "Study finished" without a word.
+#[test]
+fn the_numbers_of_repeated_points_have_names_at_80_columns() {
+    let screen = repeated("m", Some(0.96)).screen(80, 24);
+    assert_shows(&line_with(&screen, "landed"), &["#   landed mean, std m   leads"]);
+    assert_shows(&screen, &["#12 2/2    0.442 ±0.050  96 %", "#30 9/10   -0.410 ±0.050\n"]);
+    let screen = repeated("rad", None).screen(80, 24);
+    assert_shows(&screen, &["#   landed mean, std rad\n", "#12 2/2    0.442 ±0.050\n"]);
+    // On a wide terminal each line has its words.
+    assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["2/2 landed  0.442 m ±0.050  leads, 96 %"]);
+    // A study without repeats has no such line.
+    let mut console = repeated("m", None);
+    console.record(Record::Points(Vec::new()));
+    assert!(!console.screen(80, 24).contains("mean, std"), "{}", console.screen(80, 24));
+}
