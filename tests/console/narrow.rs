@@ -43,3 +43,23 @@ fn the_numbers_of_repeated_points_have_names_at_80_columns() {
     console.record(Record::Points(Vec::new()));
     assert!(!console.screen(80, 24).contains("mean, std"), "{}", console.screen(80, 24));
 }
+
+/// Regression: `columns (x)` and `by number (s)` went as the counts grew.
+#[test]
+fn the_keys_in_the_heading_of_trials_stay_while_the_counts_grow() {
+    let keys = "by number (s), all (F), columns (x)";
+    let mut console = Console::ready();
+    console.press(&["2"]);
+    for count in [3, 30, 300, 999] {
+        console.judged(count);
+        assert_shows(&console.screen(80, 24), &[keys]);
+        assert_shows(&console.screen(120, 40), &["void", keys]);
+    }
+    // The order with the longest name.
+    for _ in 0..20 {
+        console.press(&["s"]);
+        assert_shows(&console.screen(80, 24), &["(s), all (F), columns (x)"]);
+    }
+    console.press(&["S", "F"]);
+    assert_shows(&console.screen(80, 24), &["reversed (s), only accept (F), columns (x)"]);
+}

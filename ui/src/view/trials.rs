@@ -18,33 +18,34 @@ use crate::theme::Role;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let later = model.later_trials().count();
-    let mut title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
+    let title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
     let (rows, room) = (model.trial_rows().len(), usize::from(area.height).saturating_sub(2));
-    if rows > room {
-        title += &format!(" ({room} of {rows})");
-    }
-    // Where the whole summary has no room, the keys of the columns and of the order give way, then the keys of the filter.
+    let whole = if rows > room { format!("{title} ({room} of {rows})") } else { title.clone() };
+    // Where the whole summary has no room, its numbers give way one by one, then the number of rows, the keys last.
     let summaries = summaries(model);
-    let fits = |summary: &&String| heading_width(&title, summary) <= usize::from(area.width);
-    let summary = summaries.iter().find(fits).map_or("", String::as_str);
-    let body = heading(frame, area, &model.theme, &title, summary);
+    let mut headings = summaries.iter().flat_map(|summaries| {
+        [&whole, &title].into_iter().flat_map(move |title| summaries.iter().map(move |summary| (title, summary)))
+    });
+    let fits = |(title, summary): &(&String, &String)| heading_width(title, summary) <= usize::from(area.width);
+    let (title, summary) = headings.find(fits).map_or((&title, ""), |(title, summary)| (title, summary));
+    let body = heading(frame, area, &model.theme, title, summary);
     render_table(frame, body, model, true);
 }
 
-/// The number of each verdict, and the order and filter of the table, from the longest to the shortest; where the trials are
-/// judged again, the result of that.
-fn summaries(model: &Model) -> Vec<String> {
+/// The number of each verdict with the order, filter and columns of the table, from the longest to the shortest: those with all
+/// keys, and those with some. Where the trials are judged again, the result of that.
+fn summaries(model: &Model) -> [Vec<String>; 2] {
     if let Some(table) = &model.rejudged {
         // The end of a path names the folder.
         let skipped = table.configuration.chars().count().saturating_sub(24);
         let name: String = table.configuration.chars().skip(skipped).collect();
-        return vec![format!("new by {name}: {}", table.summary())];
+        return [vec![format!("new by {name}: {}", table.summary())], Vec::new()];
     }
     let trials = &model.session.trials;
-    let mut counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).join(", ");
+    let mut counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).to_vec();
     match trials.records.values().filter(|trial| trial.was_not_run()).count() {
         0 => {}
-        count => counts += &format!(", {count} not run"),
+        count => counts.push(format!("{count} not run")),
     }
     let view = &model.trial_table;
     let (shown, by_filter) = match (view.best_only, view.filter) {
@@ -62,12 +63,9 @@ fn summaries(model: &Model) -> Vec<String> {
     let turned = if view.reversed { " reversed" } else { "" };
     let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
     let order = format!("by {sort}{turned} ({by}), {shown} ({only})");
-    vec![
-        format!("{counts}; {order}, columns ({columns})"),
-        format!("{counts}; {order}"),
-        format!("{counts}; {shown} ({only})"),
-        counts,
-    ]
+    let keys = format!("{order}, columns ({columns})");
+    let with_counts = (1..=counts.len()).rev().map(|count| format!("{}; {keys}", counts[..count].join(", ")));
+    [with_counts.chain([keys.clone()]).collect(), vec![order, format!("{shown} ({only})")]]
 }
 
 /// Columns of the longest source in the table.
