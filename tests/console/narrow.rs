@@ -3,6 +3,7 @@
 use crate::support::{Console, assert_shows, line_with, session, trial};
 use quadfrog::recording::record::Record;
 use quadfrog::trial::{ExperimentStage, PointRecord, Verdict};
+use quadfrog_console::message::Msg;
 
 /// A finished study with two points that were repeated.
 fn repeated(unit: &str, confidence: Option<f64>) -> Console {
@@ -62,4 +63,24 @@ fn the_keys_in_the_heading_of_trials_stay_while_the_counts_grow() {
     }
     console.press(&["S", "F"]);
     assert_shows(&console.screen(80, 24), &["reversed (s), only accept (F), columns (x)"]);
+}
+
+/// Regression: the times of the stages took two lines once they had two digits.
+#[test]
+fn the_times_of_the_stages_have_one_line_at_80_columns() {
+    let mut console = Console::ready();
+    console.press(&["5"]);
+    for (stages_ns, shown) in
+        [([12_300, 25_000, 13_000], "12, 25, 13 us"), ([100_000, 250_000, 130_000], "100, 250, 130 us")]
+    {
+        let [read_ns, decide_ns, write_ns] = stages_ns;
+        let mut snapshot = console.model.snapshot;
+        (snapshot.tick.stages.read_ns, snapshot.tick.stages.decide_ns) = (read_ns, decide_ns);
+        snapshot.tick.stages.write_ns = write_ns;
+        console.update(Msg::Snapshot(Box::new(snapshot)));
+        let screen = console.screen(80, 24);
+        assert_shows(&screen, &[&format!("read, decide, write {shown} ")]);
+        let at = screen.lines().position(|line| line.starts_with("read, decide, write")).expect("the line");
+        assert!(!screen.lines().nth(at + 1).unwrap_or_default().starts_with("    "), "{screen}");
+    }
 }

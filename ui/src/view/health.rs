@@ -181,7 +181,8 @@ fn timing_rows(model: &Model) -> Vec<HealthRow> {
         row("worst", format!("{worst_ms:.2} ms late"), matters && worst_ms > limits.late_ms),
         row("wake-up", micro(&late), matters && percentile(&late, 0.99) > 5e5),
         row("tick takes", micro(&busy), percentile(&busy, 0.99) > 5e5),
-        detail("stages, us", format!("read {read:.0}, decide {decide:.0}, write {write:.0}"), false),
+        // The names before the column of the values: so three numbers of three digits have room in 38 columns.
+        detail("read, decide, write ", format!("{read:.0}, {decide:.0}, {write:.0} us"), false),
     ]
 }
 
