@@ -126,7 +126,7 @@ fn line(
 /// The number of items that forbid arming, in words, with the time of the checks once the robot is armed.
 pub fn summary(model: &Model) -> String {
     match (result(model), checked_at(model)) {
-        (result, Some(at)) if !result.is_empty() => format!("checked at {at}: {result}"),
+        (result, Some(at)) if !result.is_empty() => format!("at {at}: {result}"),
         (result, _) => result,
     }
 }
@@ -135,7 +135,8 @@ pub fn summary(model: &Model) -> String {
 pub fn title(model: &Model, short: bool) -> String {
     match checked_at(model) {
         Some(at) if short => format!("Checks at {at}: {}", result(model)),
-        _ => format!("Arming checks: {}", summary(model)),
+        Some(at) => format!("Arming checks at {at}: {}", result(model)),
+        None => format!("Arming checks: {}", result(model)),
     }
 }
 

@@ -50,11 +50,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let limited = if model.snapshot.tick.limited != 0 { "max: limited by the gate" } else { "" };
     panel(frame, motors, model, ("Motors", limited), lines(model, right.width, MOTOR_NAME_WIDTH, &motor_rows(model)));
     let aside = format!("{} ({})", arming::summary(model), model.keymap.key(Action::ArmingChecks));
-    let (title, aside) = match checks.width < WHOLE_TITLE_FROM {
-        true => ("Arming", aside.trim_start_matches("checked ")),
-        false => ("Arming checks", aside.as_str()),
-    };
-    let body = heading(frame, checks, &model.theme, title, aside);
+    let title = if checks.width < WHOLE_TITLE_FROM { "Arming" } else { "Arming checks" };
+    let body = heading(frame, checks, &model.theme, title, &aside);
     let lines = arming::lines(model, usize::from(body.width), usize::from(body.height));
     frame.render_widget(Paragraph::new(lines), body);
 }
