@@ -206,7 +206,7 @@ impl Container {
             last.channels = None;
         }
         self.cut = Some(match bytes - at {
-            0 => "it was not finished; nothing after its last complete chunk was written".into(),
+            0 => "its end was not written: the program that recorded it did not finish the file; everything before is there".into(),
             rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete record"),
         });
         Ok(())

@@ -170,7 +170,7 @@ fn a_recording_is_recovered_into_the_file_that_is_given() {
     let program = Program::new();
     let (part, _) = cut(&program);
     let printed = program.text(&["recover", "cut.mcap.part", "--output", "found.mcap"]);
-    assert_shows(&printed, &["found.mcap", "ticks", "Lost:", "cut.mcap.part is unchanged"]);
+    assert_shows(&printed, &["found.mcap", "ticks", "The recording is not complete: ", "cut.mcap.part is unchanged"]);
     assert!(!program.path("cut.mcap").exists());
     assert_eq!(Player::open(program.path("found.mcap")).unwrap().damage(), None);
     // Nothing is overwritten, the name says what the file is, and a lock without a session does not count.

@@ -29,7 +29,7 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
     let recovered = recovered.map_err(failure)?;
     put_line!("{}: {} ticks, {} messages", recovered.path.display(), recovered.ticks, recovered.messages);
     match recovered.lost {
-        Some(lost) => put_line!("Lost: {lost}"),
+        Some(lost) => put_line!("The recording is not complete: {lost}."),
         None => put_line!("Nothing was lost."),
     }
     put_line!("{} is unchanged.", file.display());
