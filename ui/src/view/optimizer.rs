@@ -119,7 +119,17 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
         items.push((symbol, role, "not judged"));
     }
     items.push(("*", Role::Good, "best"));
-    items.push((theme.bar(), Role::Key, if modelled { "proposal, deviation" } else { "proposal" }));
+    // Without an open proposal the reasons of the last one stay, with its line.
+    let reasons = densities || modelled && session.insight.as_ref().is_some_and(|i| !i.parameters.is_empty());
+    let line = match (session.open_proposal().is_some(), reasons, modelled) {
+        (true, _, false) => Some((Role::Key, "proposal")),
+        (true, _, true) => Some((Role::Key, "proposal, deviation")),
+        (false, true, false) => Some((Role::Key, "last proposal")),
+        (false, true, true) => Some((Role::Key, "last proposal, deviation")),
+        (false, false, true) => Some((Role::Quiet, "deviation")),
+        (false, false, false) => None,
+    };
+    items.extend(line.map(|(role, text)| (theme.bar(), role, text)));
     if densities && !modelled {
         items.extend([("g", Role::Good, "good"), ("r", Role::SeriesB, "rest")]);
     }
