@@ -2,13 +2,14 @@
 
 use ratatui::Frame;
 use ratatui::text::Line;
-use ratatui::widgets::{Paragraph, Wrap};
+use ratatui::widgets::Paragraph;
 
 use super::draw::span;
 use super::{countdown, dialogs, next_step, proposal, status_bar};
 use crate::layout::{CompactAreas, MIN_COLUMNS, MIN_ROWS};
 use crate::model::Model;
 use crate::theme::Role;
+use crate::wrap::wrap;
 
 /// Columns of the longest key with its text, which is not broken.
 const LONGEST_KEY: usize = 16;
@@ -22,8 +23,8 @@ pub fn render(frame: &mut Frame, areas: CompactAreas, model: &Model) {
     dialogs::render(frame, trial, model);
     countdown::render(frame, trial, model);
     status_bar::render_message(frame, message, model);
-    // Two rows, less what is lost where the first one is broken between words.
-    let width = 2 * usize::from(next_step.width) - LONGEST_KEY;
-    let line = next_step::line_within(model, width);
-    frame.render_widget(Paragraph::new(line).wrap(Wrap { trim: true }), next_step);
+    // Two rows, less the margin of the second and what is lost where the first one is broken between words.
+    let columns = usize::from(next_step.width);
+    let line = next_step::line_within(model, 2 * columns - 1 - LONGEST_KEY);
+    frame.render_widget(Paragraph::new(wrap(&line, columns, 1)), next_step);
 }
