@@ -2,7 +2,8 @@
 
 use crate::support::{Console, assert_shows, line_with, session, trial};
 use quadfrog::recording::record::Record;
-use quadfrog::trial::{ExperimentStage, PointRecord, Verdict};
+use quadfrog::telemetry::Mode;
+use quadfrog::trial::{ExperimentStage, ParameterInsight, PointRecord, ProposalInsight, Verdict};
 use quadfrog_console::message::Msg;
 
 /// A finished study with two points that were repeated.
@@ -82,5 +83,78 @@ fn the_times_of_the_stages_have_one_line_at_80_columns() {
         assert_shows(&screen, &[&format!("read, decide, write {shown} ")]);
         let at = screen.lines().position(|line| line.starts_with("read, decide, write")).expect("the line");
         assert!(!screen.lines().nth(at + 1).unwrap_or_default().starts_with("    "), "{screen}");
+    }
+}
+
+/// Regression: "Arming checks: checked at" named the checks twice.
+#[test]
+fn the_time_of_the_arming_checks_stands_beside_their_name() {
+    let mut console = Console::ready();
+    for keys in [&["P"][..], &["Esc", "5"]] {
+        console.press(keys);
+        for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+            let screen = console.screen(columns, rows);
+            assert!(!screen.contains("checked at"), "{screen}");
+            let line = screen.lines().find(|line| line.contains("Arming")).unwrap_or_default();
+            assert_shows(line, &[" at ", ": 1 passed"]);
+        }
+    }
+}
+
+/// Regression: the legend explained the line of a proposal after the end of the study, where none was drawn.
+#[test]
+fn the_legend_of_the_optimizer_explains_the_line_that_is_drawn() {
+    let mut console = Console::ready();
+    console.judged(4);
+    console.press(&["3"]);
+    let legend = |console: &Console| line_with(&console.screen(80, 24), "* best");
+    assert_shows(&legend(&console), &["│ proposal"]);
+    console.stage(ExperimentStage::Finished, 4);
+    assert!(!legend(&console).contains("proposal"), "{}", legend(&console));
+    // The reasons of the last proposal stay.
+    let reasons = ParameterInsight {
+        name: "Fx".into(),
+        proposed: 75.0,
+        at: vec![0.0, 75.0, 150.0],
+        good: vec![0.1, 0.4, 0.1],
+        bad: vec![0.2, 0.2, 0.2],
+        importance: None,
+    };
+    console.record(Record::Insight(ProposalInsight { trial: 3, parameters: vec![reasons], ..Default::default() }));
+    assert_shows(&legend(&console), &["│ last proposal"]);
+}
+
+/// Regression: the second row of the last line began at the edge of a terminal of 60 columns.
+#[test]
+fn both_rows_of_the_next_step_have_a_margin_in_a_small_terminal() {
+    for (console, count) in [(Console::ready(), 1), (Console::review(Mode::Ready, Verdict::Accept), 2)] {
+        let screen = console.screen(60, 20);
+        let rows: Vec<&str> = screen.lines().skip(18).collect();
+        assert_eq!(rows.iter().filter(|row| !row.is_empty()).count(), count, "{screen}");
+        assert!(rows.iter().all(|row| row.is_empty() || row.starts_with(' ')), "{screen}");
+    }
+}
+
+/// Regression: a box in which text is typed changed its width with each answer.
+#[test]
+fn a_text_box_keeps_its_width() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    let width = |console: &Console| {
+        let screen = console.screen(120, 40);
+        let top = screen.lines().find(|line| line.contains('┌'))?.to_owned();
+        Some(top.split_once('┌')?.1.split_once('┐')?.0.chars().count())
+    };
+    for (open, typed) in [("m", "a note"), ("o", "9999")] {
+        console.press(&[open]);
+        let opened = width(&console);
+        assert!(opened.is_some());
+        console.enter(typed);
+        assert_eq!(width(&console), opened);
+        console.press(&["F5"]);
+        assert_eq!(width(&console), opened);
+        console.enter(&typed.repeat(20));
+        assert_eq!(width(&console), opened, "{}", console.screen(120, 40));
+        console.press(&["Esc", "Esc"]);
     }
 }

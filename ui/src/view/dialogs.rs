@@ -52,11 +52,11 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Dialog::Override(form) => {
             // The whole width of the smallest terminal: nothing of the view stands beside it there.
             let lines = overrides(model, form, usize::from(area.width.min(MIN_COLUMNS).saturating_sub(4)));
-            popup(frame, area, model, &format!("Override trial #{}", form.trial), MIN_COLUMNS, lines)
+            text_box(frame, area, model, &format!("Override trial #{}", form.trial), lines)
         }
         Dialog::Field { purpose, input, replaces, problem } => {
             let lines = field(model, *purpose, (input, *replaces), problem.as_deref());
-            popup(frame, area, model, &field_title(model, *purpose), 64, lines);
+            text_box(frame, area, model, &field_title(model, *purpose), lines);
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
         Dialog::Choose { subject, selected } => render_choice(frame, area, model, *subject, *selected),
@@ -153,7 +153,16 @@ fn open_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u1
 fn popup(frame: &mut Frame, area: Rect, model: &Model, title: &str, width: u16, lines: Vec<Line<'static>>) {
     let longest = lines.iter().map(Line::width).max().unwrap_or(0) as u16 + 4;
     let width = longest.clamp(width, MAX_WIDTH.max(width)).min(area.width);
-    let lines = wrap_all(&lines, usize::from(width.saturating_sub(4)), 0);
+    fixed_box(frame, area, model, (title, width), &lines);
+}
+
+/// Draws a box in which text is typed: as wide as the smallest terminal, whatever is typed or answered.
+fn text_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, lines: Vec<Line<'static>>) {
+    fixed_box(frame, area, model, (title, MIN_COLUMNS.min(area.width)), &lines);
+}
+
+fn fixed_box(frame: &mut Frame, area: Rect, model: &Model, (title, width): (&str, u16), lines: &[Line]) {
+    let lines = wrap_all(lines, usize::from(width.saturating_sub(4)), 0);
     let inner = open_box(frame, area, model, title, width, lines.len() as u16 + 2);
     frame.render_widget(Paragraph::new(lines), inner);
 }
