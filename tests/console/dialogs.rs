@@ -1,6 +1,7 @@
 //! Sentences that a person confirms are never cut.
 
 use crate::support::{Console, assert_shows, line_with, session, trial};
+use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
@@ -417,4 +418,43 @@ fn the_form_of_the_override_has_the_only_cursor_and_whole_rows() {
         console.press(&["Home"]);
         assert_shows(&line_with(&console.screen(60, 20), "> f0"), &[" 1.23456> Hz", "] 1.750"]);
     }
+}
+
+/// Regression: the help of a replay listed the keys that command a robot.
+#[test]
+fn the_help_of_a_replay_lists_no_key_that_commands_the_robot() {
+    let read = |observer: Option<ObserverStatus>| {
+        let mut console = Console::ready();
+        console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+        console.update(Msg::Replay(ReplayStatus { observer, ..ReplayStatus::default() }));
+        console.press(&["?"]);
+        let mut read = String::new();
+        for _ in 0..60 {
+            read.push_str(&console.screen(120, 40));
+            console.press(&["Down"]);
+        }
+        read
+    };
+    let keys = |words: &str| words.split_whitespace().collect::<Vec<_>>().join(" ");
+    let replay = keys(&read(None));
+    let commands = [
+        "STOP: damp all motors",
+        "arm: the robot",
+        "sit down",
+        "approve the jump",
+        "accept: it counts",
+        "undo",
+        "write a note",
+    ];
+    for command in commands {
+        assert!(!replay.contains(command), "{command}");
+    }
+    let meant =
+        ["Ctrl-C twice within 2 s: quit", "P arming checks", "N the queue", "p play or pause", "R tables", "q quit"];
+    for key in meant {
+        assert!(replay.contains(key), "{key}");
+    }
+    // An observer's STOP reaches the robot.
+    let watched = keys(&read(Some(ObserverStatus::default())));
+    assert!(watched.contains("STOP: damp all motors") && !watched.contains("approve the jump"));
 }

@@ -100,6 +100,15 @@ pub fn palette(filter: &str, model: &Model) -> Vec<(&'static ActionInfo, Legalit
     rows
 }
 
+/// Whether an action can have a meaning in this session: in a replay not those that command a robot.
+pub fn has_meaning(action: Action, model: &Model) -> bool {
+    let commands = match action {
+        Action::Stop => !model.can_stop(),
+        _ => model.replay.is_some() && may_request(model).err() == legal(action, model).err(),
+    };
+    !commands
+}
+
 /// Whether this session accepts requests.
 pub fn may_request(model: &Model) -> Legality {
     require(model.observer().is_none(), "this console only watches; of its keys STOP alone reaches the session")?;

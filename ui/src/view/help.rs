@@ -4,18 +4,19 @@ use ratatui::text::Line;
 use strum::VariantArray;
 
 use super::draw::span;
-use crate::action::{ACTIONS, ActionGroup};
-use crate::legal::legal;
+use crate::action::{ACTIONS, Action, ActionGroup};
+use crate::legal::{has_meaning, legal};
 use crate::model::Model;
 use crate::theme::Role;
 
 /// Columns before the text of an action.
 pub const INDENT: usize = 13;
 
-/// The keys by group: in a replay those of the replay first, and while a trial waits for its verdict those of the verdict.
+/// The keys by group: in a replay those of the replay first and none that commands a robot, and while a trial waits for its verdict those of the verdict.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
+    let quits_alone = |action| action == Action::Interrupt && !model.can_stop();
     let mut groups = ActionGroup::VARIANTS.to_vec();
     let first = match (&model.replay, model.session.under_review()) {
         (Some(_), _) => Some(ActionGroup::Replay),
@@ -24,16 +25,21 @@ pub fn lines(model: &Model) -> Vec<Line<'static>> {
     };
     groups.sort_by_key(|group| first.is_some_and(|first| *group != first));
     for group in groups {
+        let actions: Vec<_> =
+            ACTIONS.iter().filter(|info| info.group == group && has_meaning(info.action, model)).collect();
+        if actions.is_empty() {
+            continue;
+        }
         if !lines.is_empty() {
             lines.push(Line::default());
         }
         lines.push(Line::from(span(theme, Role::Heading, <&str>::from(group))));
-        for info in ACTIONS.iter().filter(|info| info.group == group) {
+        for info in actions {
             let legal = legal(info.action, model).is_ok();
             let (key, text) = if legal { (Role::Key, Role::Text) } else { (Role::Quiet, Role::Quiet) };
             lines.push(Line::from(vec![
                 span(theme, key, format!("  {:<10} ", model.keymap.all_keys(info.action))),
-                span(theme, text, info.help),
+                span(theme, text, if quits_alone(info.action) { "twice within 2 s: quit" } else { info.help }),
             ]));
         }
     }
