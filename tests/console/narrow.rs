@@ -3,7 +3,10 @@
 use crate::support::{Console, assert_shows, line_with, session, trial};
 use quadfrog::recording::record::Record;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, ParameterInsight, PointRecord, ProposalInsight, Verdict};
+use quadfrog::trial::{
+    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
+    Verdict,
+};
 use quadfrog_console::message::Msg;
 
 /// A finished study with two points that were repeated.
@@ -157,4 +160,24 @@ fn a_text_box_keeps_its_width() {
         assert_eq!(width(&console), opened, "{}", console.screen(120, 40));
         console.press(&["Esc", "Esc"]);
     }
+}
+
+/// Regression: Live showed a parameter that the operator had fixed like one that the sampler had proposed.
+#[test]
+fn live_says_that_a_parameter_is_fixed() {
+    let mut console = Console::ready();
+    let fixed = |value, trials| {
+        let fixed = Some(FixedParameter { value, trials });
+        let fx = SearchedParameter { name: "Fx".into(), low: 0.0, high: 150.0, least: 0.0, most: 200.0, fixed };
+        Record::Search(SearchStatus { budget: 20, parameters: vec![fx], ..SearchStatus::default() })
+    };
+    console.record(fixed(75.0, 3));
+    for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&line_with(&screen, " Fx  "), &["75.00 N   fixed, 3 more"]);
+        assert!(!line_with(&screen, " Fz  ").contains("fixed"), "{screen}");
+    }
+    // The present proposal has another value, as a queued point has.
+    console.record(fixed(90.0, 3));
+    assert!(!console.screen(80, 24).contains("fixed"), "{}", console.screen(80, 24));
 }

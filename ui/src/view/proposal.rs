@@ -2,7 +2,7 @@
 //! best parameters when the study is finished.
 
 use quadfrog::trial::{
-    ExpectedResult, ExperimentStage, FallRisk, PredictedTrial, ProposedParameter, TrialRecord, Verdict,
+    ExpectedResult, ExperimentStage, FallRisk, FixedParameter, PredictedTrial, ProposedParameter, TrialRecord, Verdict,
 };
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -57,8 +57,7 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
                 repeats => format!(", repeat {} of {repeats}", proposal.repeat),
             };
             let title = format!("Trial #{}{repeat}{source}", proposal.trial);
-            let mut lines: Vec<Line> =
-                proposal.parameters.iter().map(|p| parameter(session, theme, p, width)).collect();
+            let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| proposed(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
             lines.extend(expected(session, theme, proposal.expected));
@@ -81,6 +80,21 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
             (title, lines)
         }
         _ => ("Proposal".to_owned(), vec![Line::from(span(theme, Role::Quiet, " none yet"))]),
+    }
+}
+
+/// A parameter of the proposal; one that the operator has fixed has the trials left in place of its bounds.
+fn proposed(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width: usize) -> Line<'static> {
+    // A queued point has values of its own, and so has a changed one.
+    let has_it = |fixed: &FixedParameter| fixed.value == p.value && p.value == p.proposed;
+    match session.searched(&p.name).and_then(|searched| searched.fixed).filter(has_it) {
+        Some(fixed) => {
+            // Without room for the bounds.
+            let mut line = parameter(session, theme, p, 0);
+            line.push_span(span(theme, Role::Warning, format!(" fixed, {} more", fixed.trials)));
+            line
+        }
+        None => parameter(session, theme, p, width),
     }
 }
 
