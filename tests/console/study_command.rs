@@ -415,3 +415,26 @@ fn a_proposal_that_was_not_run_is_no_trial_in_the_list_and_in_the_report() {
     let studies = tables.iter().find(|table| table["caption"].as_str().unwrap().starts_with("Studies.")).unwrap();
     assert_eq!(studies["rows"][0][1], 3, "{studies}");
 }
+
+/// Regression: a conclusion that an earlier version had kept from equal repeats was shown with full confidence.
+#[test]
+fn a_kept_conclusion_of_equal_repeats_is_shown_without_a_confidence() {
+    let (program, place) = study("forward");
+    let row = |f0: f64, value: f64| format!("{f0},100,250,{value}\n").repeat(3);
+    program.write("equal.csv", &format!("params_f0,params_Fx,params_Fz,value\n{}{}", row(1.0, 0.5), row(1.1, 0.4)));
+    program.text(&["study", "import", &place, "equal.csv"]);
+    let journal = Path::new(&place).join("study.log");
+    let mut text = fs::read_to_string(&journal).unwrap();
+    let attribute = r#"{"confirmed":{"confidence":1.0,"leader":6,"sure":true,"trials":[6,9]}}"#;
+    text += &format!("{{\"op_code\":2,\"worker_id\":\"test\",\"study_id\":0,\"user_attr\":{attribute}}}\n");
+    fs::write(&journal, text).unwrap();
+    let reason =
+        "the point of trial 6 leads without a confidence, because equal jumps give equal values here: mean 0.500";
+    assert_shows(&program.text(&["study", "show", &place]), &[reason]);
+    let mut session = Session::start(&program.path(""), (120, 40), &["--resume", &place]);
+    session.send("3");
+    session.wait_for(&["Repeated points", "3/3 landed  0.500 m"]);
+    assert!(!session.screen().contains("leads"), "{}", session.screen());
+    session.send("q");
+    assert!(session.wait().success());
+}

@@ -141,7 +141,8 @@ impl BestConfirmation {
         };
         let leader = match (&concluded, &running) {
             (Some(concluded), _) => {
-                Some((concluded.leader, concluded.confidence)).filter(|(_, confidence)| *confidence > NO_CONFIDENCE)
+                let confidence = kept_confidence(concluded, &compared(&concluded.trials, study));
+                (confidence > NO_CONFIDENCE).then_some((concluded.leader, confidence))
             }
             (None, Some(running)) => {
                 let compared = compared(&running.trials, study);
@@ -184,7 +185,7 @@ pub fn confirmation_in_words(study: &Study) -> Option<String> {
     let points = compared(&concluded.trials, study);
     let leader = points.iter().position(|point| point.trials.contains(&concluded.leader))?;
     let short = if concluded.sure { "" } else { ", less than was wanted" };
-    Some(format!("{}{short}", lead_text(&points, leader, concluded.confidence)))
+    Some(format!("{}{short}", lead_text(&points, leader, kept_confidence(&concluded, &points))))
 }
 
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
@@ -231,7 +232,13 @@ fn repeated(compared: &[RepeatedPoint]) -> bool {
 
 /// Whether the repeats of any point differ. Those of a simulator without noise do not, and say nothing about the next jump of a robot.
 fn varies(compared: &[RepeatedPoint]) -> bool {
-    compared.iter().any(|point| point.deviation().is_some_and(|deviation| deviation > 0.0))
+    // The deviation of three times 0.4 is not zero: their mean is rounded.
+    compared.iter().any(|point| point.values.windows(2).any(|pair| pair[0] != pair[1]))
+}
+
+/// The confidence of a conclusion: an earlier version kept one of 1 where the repeats are equal.
+fn kept_confidence(concluded: &Conclusion, compared: &[RepeatedPoint]) -> f64 {
+    if repeated(compared) && !varies(compared) { NO_CONFIDENCE } else { concluded.confidence }
 }
 
 /// The leading point in words.
