@@ -20,7 +20,7 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
     text + "  " + &verdict(row)
 }
 
-/// The best trial as a line, with what the sampler's model says of it and its gains that differ from `configured`, or a line
+/// The best trial as a line, with what the sampler's model says of it and its gains that differ from `configured`, the newest configuration, or a line
 /// about its absence.
 pub fn best_line(
     best: Option<&TrialRecord>,

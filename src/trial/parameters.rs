@@ -140,11 +140,11 @@ impl Gains {
     }
 }
 
-/// Returns in words the gains that differ from the configured ones, `other gains: kp 500 (configured 400)`; empty where none
-/// does. Those that are searched as parameters are not among them.
+/// Returns in words the gains that differ from those of a configuration, `other gains: kp 500 (configured 400)`, where `called` is
+/// `configured`; empty where none does. Those that are searched as parameters are not among them.
 pub fn other_gains(
     gains: &ParameterValues,
-    configured: &ParameterValues,
+    (called, configured): (&str, &ParameterValues),
     is_searched: impl Fn(&str) -> bool,
 ) -> String {
     let different: Vec<String> = configured
@@ -152,7 +152,7 @@ pub fn other_gains(
         .filter(|(name, _)| !is_searched(name))
         .filter_map(|(name, usual)| {
             let value = gains.get(name)?;
-            (value != *usual).then(|| format!("{name} {value} (configured {usual})"))
+            (value != *usual).then(|| format!("{name} {value} ({called} {usual})"))
         })
         .collect();
     if different.is_empty() { String::new() } else { format!("other gains: {}", different.join(", ")) }

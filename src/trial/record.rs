@@ -63,9 +63,10 @@ impl TrialRecord {
         self.source.with_parent(self.parent)
     }
 
-    /// Returns in words the gains that differ from the configured ones; empty where none does.
-    pub fn other_gains(&self, configured: &ParameterValues) -> String {
-        other_gains(&self.gains, configured, |name| self.parameters.get(name).is_some())
+    /// Returns in words the gains that differ from those of the newest configuration of its study, which may not be the one that it
+    /// ran with; empty where none does.
+    pub fn other_gains(&self, newest: &ParameterValues) -> String {
+        other_gains(&self.gains, ("newest configuration:", newest), |name| self.parameters.get(name).is_some())
     }
 
     /// Returns whether it counts for the budget: accepted or fallen. Repeats that confirm the best are beyond the budget.

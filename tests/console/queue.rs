@@ -111,7 +111,8 @@ fn queued_points_are_seen_moved_and_removed() {
     }
 }
 
-/// Regression: the gains that the operator has changed for the best trial were in its note alone.
+/// Regressions: the gains that the operator has changed for the best trial were in its note alone, and were called different from
+/// the configured ones after another session had configured others.
 #[test]
 fn changed_gains_of_the_best_trial_are_shown_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -130,9 +131,21 @@ fn changed_gains_of_the_best_trial_are_shown_with_it() {
     let study = study.to_str().unwrap();
     let shown = text(&quadfrog(folder.path(), &["study", "show", study]));
     let best: Vec<&str> = shown.lines().skip_while(|line| !line.starts_with("Best: trial")).collect();
-    assert_eq!(best.get(1), Some(&"      other gains: kp 600 (configured 400)"), "{shown}");
+    assert_eq!(best.get(1), Some(&"      other gains: kp 600 (newest configuration: 400)"), "{shown}");
     let report = text(&quadfrog(folder.path(), &["report", study]));
-    assert!(report.contains("Best trial of forward, seed 3, other gains: kp 600 (configured 400)."), "{report}");
+    assert!(
+        report.contains("Best trial of forward, seed 3, other gains: kp 600 (newest configuration: 400)."),
+        "{report}"
+    );
+    // The note has the configuration with which the trial ran; the comparison that with which the study runs now.
+    std::fs::create_dir(folder.path().join("other")).expect("a folder");
+    std::fs::write(folder.path().join("other/control.toml"), "[tasks.forward]\nkp = 500.0\n").expect("a configuration");
+    let mut session = Session::start(folder.path(), (120, 40), &["--resume", study, "--config", "other"]);
+    session.wait_for(&["Study finished"]);
+    assert!(session.quit().success());
+    let shown = text(&quadfrog(folder.path(), &["study", "show", study]));
+    assert!(shown.contains("other gains: kp 600 (newest configuration: 500)"), "{shown}");
+    assert!(shown.contains("other gains: kp 600 (configured 400)"), "{shown}");
 }
 
 /// The first point of the queue is the proposal: when it is moved or removed, the next one is proposed, and STOP works over the list.

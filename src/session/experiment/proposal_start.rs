@@ -201,7 +201,9 @@ impl Experiment {
             source: proposal.source,
             parent: proposal.parent,
             parameters: proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-            note: other_gains(&gains, &self.plan.control.gains().values(), |name| self.plan.optimizes(name)),
+            note: other_gains(&gains, ("configured", &self.plan.control.gains().values()), |name| {
+                self.plan.optimizes(name)
+            }),
             risk: proposal.risk,
             expected: proposal.expected,
             gains,
