@@ -221,3 +221,53 @@ fn an_error_is_one_plain_line_without_colours_and_repetitions() {
     assert_eq!(message.trim_end().lines().count(), 1, "{message}");
     assert_eq!(message.matches("a part of its path is a file").count(), 1, "the cause stands once: {message}");
 }
+
+/// Regression: long messages and paths were broken in the middle of a word at the width of the terminal.
+#[test]
+fn messages_in_a_terminal_are_broken_between_words() {
+    let program = Program::new();
+    let folder = "a-folder-with-a-long-name/".repeat(2);
+    let message = String::from_utf8(program.run(&["study", "show", &folder]).stderr).unwrap();
+    assert!(message.lines().any(|line| line.chars().count() > 60), "in a file the message has one line: {message}");
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["study", "show", &folder]);
+    let mut session = Session::run(&program.path(""), (60, 24), command);
+    session.wait();
+    let rows = session.screen();
+    for word in message.split_whitespace().filter(|word| !word.contains('`')) {
+        assert!(rows.lines().any(|row| row.split(' ').any(|shown| shown == word)), "{word} is broken:\n{rows}");
+    }
+}
+
+/// The commands at the end of a session are whole in a line of their own, to be copied.
+#[test]
+fn the_commands_at_the_end_of_a_session_begin_in_a_line_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = folder.path().join("a-folder-with-a-long-name");
+    let mut session = Session::start(&long, (80, 24), &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("q");
+    assert!(session.wait().success());
+    let sent = String::from_utf8_lossy(&session.sent_bytes()).into_owned();
+    let shown = sent.split("The study and its recording are in").nth(1).expect("the end of the session");
+    assert_shows(
+        shown,
+        &["continue the study:\r\n    quadfrog --resume /", "play the recording:\r\n    quadfrog replay /"],
+    );
+}
+
+/// Regression: a path in a dialog was broken in the middle of a name.
+#[test]
+fn a_path_in_a_dialog_is_broken_behind_a_slash() {
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note = "recordings/forward-seed0/".repeat(8);
+    console.record(Record::Trial(row));
+    console.press(&["2", "Enter", "PgDn"]);
+    let screen = console.screen(80, 24);
+    let path: Vec<&str> = screen.lines().filter(|line| line.contains("recordings/")).collect();
+    assert!(path.len() > 2, "{screen}");
+    for line in path {
+        assert!(line.trim_end_matches(['│', ' ']).ends_with('/'), "{screen}");
+    }
+}

@@ -9,6 +9,8 @@ use std::sync::{Mutex, PoisonError};
 
 use quadfrog::report::page::is_unprintable;
 
+use crate::wrap::wrap_sentence;
+
 /// The first error of standard output; a reader that has closed the pipe is none.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
 
@@ -77,9 +79,29 @@ pub fn message(text: &str) {
     let _ = write!(io::stderr().lock(), "{}", printable(text));
 }
 
-/// Prints a line on standard error with the name of the program.
+/// Prints a line on standard error with the name of the program; on a terminal in lines that end with a word.
 pub fn notice(text: &str) {
-    message(&format!("quadfrog: {text}\n"));
+    let text = format!("quadfrog: {text}");
+    match columns(io::stderr().is_terminal()) {
+        Some(columns) => message(&format!("{}\n", wrap_sentence(&printable(&text), columns))),
+        None => message(&format!("{text}\n")),
+    }
+}
+
+/// Prints words and a path or a command on standard output: in a line of its own where a terminal has no room for both, so that it
+/// begins at the left and can be copied.
+pub fn unbroken(words: &str, whole: &str) {
+    let both = format!("{words} {whole}");
+    match columns(io::stdout().is_terminal()) {
+        Some(columns) if both.chars().count() > columns => line(&format!("{}\n    {whole}", words.trim_end())),
+        _ => line(&both),
+    }
+}
+
+/// The columns of the terminal; none without one.
+fn columns(is_terminal: bool) -> Option<usize> {
+    let (columns, _) = crossterm::terminal::size().ok().filter(|_| is_terminal)?;
+    Some(usize::from(columns)).filter(|columns| *columns > 0)
 }
 
 /// Returns the first error of standard output, for example a full disk.

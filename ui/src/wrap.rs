@@ -3,7 +3,8 @@
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-/// The line in pieces of at most `width` characters, broken at spaces, or inside a word that is longer than a line. Further
+/// The line in pieces of at most `width` characters, broken at spaces. A word that is longer than a line is broken behind a `/`, and
+/// inside a part of a path only if that is longer than a line, too. Further
 /// pieces begin with `indent` spaces. Styles stay with their characters.
 pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
     let cells: Vec<(char, Style)> =
@@ -21,7 +22,9 @@ pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
             // The break is after the last space; spaces at the begin of the line are no break.
             Some(_) => {
                 let first = rest.iter().position(|(c, _)| *c != ' ').unwrap_or(0);
-                rest[..room].iter().rposition(|(c, _)| *c == ' ').filter(|at| *at > first).unwrap_or(room)
+                let space = rest[..room].iter().rposition(|(c, _)| *c == ' ').filter(|at| *at > first);
+                let slash = || rest[..room].iter().rposition(|(c, _)| *c == '/').filter(|at| *at > first);
+                space.or_else(|| slash().map(|at| at + 1)).unwrap_or(room)
             }
         };
         let (piece, after) = rest.split_at(taken);
@@ -30,6 +33,41 @@ pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
         rest = &after[spaces.min(after.len())..];
     }
     pieces
+}
+
+/// A sentence in lines of at most `width` columns for a terminal that breaks longer ones itself. It is broken at spaces alone, and
+/// never in a command between backticks: what is longer than a line stays whole, so that it can be copied.
+pub fn wrap_sentence(text: &str, width: usize) -> String {
+    let mut wrapped = String::with_capacity(text.len() + 8);
+    let (mut column, mut quoted) = (0, false);
+    for (index, line) in text.split('\n').enumerate() {
+        if index > 0 {
+            wrapped.push('\n');
+            column = 0;
+        }
+        let mut words = line.split(' ').peekable();
+        while let Some(word) = words.next() {
+            let mut whole = word.to_owned();
+            quoted ^= word.matches('`').count() % 2 == 1;
+            while let Some(next) = words.next_if(|_| quoted) {
+                quoted ^= next.matches('`').count() % 2 == 1;
+                whole.push(' ');
+                whole.push_str(next);
+            }
+            quoted = false;
+            let length = whole.chars().count();
+            if column > 0 && column + 1 + length > width {
+                wrapped.push('\n');
+                column = 0;
+            } else if column > 0 {
+                wrapped.push(' ');
+                column += 1;
+            }
+            wrapped.push_str(&whole);
+            column += length;
+        }
+    }
+    wrapped
 }
 
 /// All lines, each wrapped.

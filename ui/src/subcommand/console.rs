@@ -11,7 +11,7 @@ use crate::model::RobotFacts;
 use crate::settings::ConsoleSettings;
 use crate::terminal;
 use crate::theme::{ColourChoice, ThemeChoice};
-use crate::{notice, put_line};
+use crate::{notice, output, put_line};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use clap::builder::TypedValueParser;
@@ -223,13 +223,13 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         );
         put_line!("  quadfrog give-back --controller {controller}{interface}{domain}");
     }
-    put_line!("The study and its recording are in {}", folder.display());
-    put_line!("  continue the study:  quadfrog --resume {}", folder.display());
+    output::unbroken("The study and its recording are in", &folder.display().to_string());
+    output::unbroken("  continue the study: ", &format!("quadfrog --resume {}", folder.display()));
     if let Some(recording) = recording {
-        put_line!("  play the recording:  quadfrog replay {}", recording.display());
+        output::unbroken("  play the recording: ", &format!("quadfrog replay {}", recording.display()));
     }
     for part in incomplete {
-        put_line!("  repair an incomplete recording:  quadfrog recover {}", part.display());
+        output::unbroken("  repair an incomplete recording: ", &format!("quadfrog recover {}", part.display()));
     }
     failure.map_or(Ok(()), Err)
 }
