@@ -601,7 +601,9 @@ fn what_never_ran_is_not_run_and_no_void_trial() {
     console.press(&["2"]);
     for (columns, rows) in [(80, 24), (120, 40)] {
         let screen = console.screen(columns, rows);
-        assert_shows(&screen, &["v not run", "0 void, 2 not run"]);
+        // Where the keys leave no room, the counts that are zero give way.
+        let counts = if columns == 80 { "1 accept, 2 not run; by" } else { "0 void, 2 not run; by" };
+        assert_shows(&screen, &["v not run", counts]);
         assert!(!screen.contains("v void"), "{screen}");
     }
     // Regression: the exported table and the log called it void.

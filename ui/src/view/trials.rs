@@ -42,11 +42,13 @@ fn summaries(model: &Model) -> [Vec<String>; 2] {
         return [vec![format!("new by {name}: {}", table.summary())], Vec::new()];
     }
     let trials = &model.session.trials;
-    let mut counts = Verdict::ALL.map(|verdict| format!("{} {}", trials.count(verdict), verdict.name())).to_vec();
-    match trials.records.values().filter(|trial| trial.was_not_run()).count() {
-        0 => {}
-        count => counts.push(format!("{count} not run")),
-    }
+    let mut counts = Verdict::ALL.map(|verdict| (trials.count(verdict), verdict.name())).to_vec();
+    counts.push((trials.records.values().filter(|trial| trial.was_not_run()).count(), "not run"));
+    let in_words = |(count, name): &(usize, &str)| format!("{count} {name}");
+    // Those that are zero give way first; that of the trials that were not run is never shown as zero.
+    let found: Vec<String> = counts.iter().filter(|(count, _)| *count > 0).map(in_words).collect();
+    counts.retain(|(count, name)| *count > 0 || *name != "not run");
+    let all: Vec<String> = counts.iter().map(in_words).collect();
     let view = &model.trial_table;
     let (shown, by_filter) = match (view.best_only, view.filter) {
         (true, _) => ("best only".to_owned(), Action::BestOnly),
@@ -64,7 +66,8 @@ fn summaries(model: &Model) -> [Vec<String>; 2] {
     let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
     let order = format!("by {sort}{turned} ({by}), {shown} ({only})");
     let keys = format!("{order}, columns ({columns})");
-    let with_counts = (1..=counts.len()).rev().map(|count| format!("{}; {keys}", counts[..count].join(", ")));
+    let fewer = (1..=found.len()).rev().map(|count| &found[..count]);
+    let with_counts = std::iter::once(&all[..]).chain(fewer).map(|counts| format!("{}; {keys}", counts.join(", ")));
     [with_counts.chain([keys.clone()]).collect(), vec![order, format!("{shown} ({only})")]]
 }
 
