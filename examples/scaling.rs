@@ -63,7 +63,7 @@ fn worker(url: &str, seed: u32, trials: usize, objective_ms: u64, sampler: Sampl
         let read = begun.elapsed();
         let draft = study.draft();
         let drafted = begun.elapsed();
-        let number = match study.begin_if(&draft, &[], &[], TrialState::Running, |all| all.len() < trials) {
+        let number = match study.begin_if(&draft, &[], &[], TrialState::Running, &|all| all.len() < trials) {
             Ok(number) => number,
             Err(StudyError::Full) => return Ok(()),
             Err(error) => return Err(error.into()),

@@ -183,7 +183,7 @@ fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), Study
     if point.is_empty() {
         return Ok(());
     }
-    study.enqueue_unless(point, &Origin::default().attributes(), |trials| !trials.is_empty()).map(drop)
+    study.enqueue_unless(point, &Origin::default().attributes(), &|trials| !trials.is_empty()).map(drop)
 }
 
 /// Returns the name of a study in its journal.

@@ -42,8 +42,9 @@ pub fn split(trials: &[Trial], direction: Direction) -> TpeSplit<'_> {
     let (good, bad) = ranked.split_at(places.min(ranked.len()));
     let (mut good, mut bad) = (good.to_vec(), bad.to_vec());
     bad.extend(trials.iter().filter(|t| t.state == TrialState::Running));
-    good.sort_by_key(|t| t.number);
-    bad.sort_by_key(|t| t.number);
+    for part in [&mut good, &mut bad] {
+        part.sort_by_key(|t| t.number);
+    }
     TpeSplit { good, bad }
 }
 

@@ -229,6 +229,11 @@ pub fn value_of(parameters: &[(String, f64)], name: &str) -> Option<f64> {
     parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
 }
 
+/// The parameters as a JSON object.
+pub(crate) fn json_object(parameters: &[(String, f64)]) -> Value {
+    Value::Object(parameters.iter().map(|(name, value)| (name.clone(), Value::from(*value))).collect())
+}
+
 /// The members of a JSON object that are numbers.
 fn numbers_of(value: &Value) -> Vec<(String, f64)> {
     let members = value.as_object().into_iter().flatten();

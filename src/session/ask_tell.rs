@@ -14,10 +14,10 @@
 use std::io::{BufRead, Read as _};
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
-use crate::optimize::trial::{TrialState, VERDICT};
+use crate::optimize::trial::{TrialState, VERDICT, json_object};
 use crate::trial::Verdict;
 
 /// Longest line, bytes, without its end.
@@ -56,7 +56,7 @@ struct TellMessage {
 #[derive(Serialize)]
 struct AskedPoint {
     number: u32,
-    params: Map<String, Value>,
+    params: Value,
     /// Probability that the robot stands at the end; none for a sampler without a model.
     p_stand: Option<f64>,
     /// Mean of the objective if it stands, in the objective's unit; none for a sampler without a model.
@@ -67,7 +67,7 @@ struct AskedPoint {
 #[derive(Serialize)]
 struct BestPoint {
     number: u32,
-    params: Map<String, Value>,
+    params: Value,
     /// Value that was reported.
     value: Option<f64>,
     /// Mean of the objective at this point by the sampler's model; none without a model.
@@ -123,7 +123,7 @@ impl AskTell {
         let number = self.study.begin(&draft, &[], &[])?;
         let point = AskedPoint {
             number,
-            params: draft.parameters.iter().map(|p| (p.name.clone(), p.value.into())).collect(),
+            params: draft.parameters.iter().map(|p| (p.name.clone(), Value::from(p.value))).collect(),
             p_stand: draft.expected.map(|expected| expected.p_stand),
             predicted: draft.expected.map(|expected| expected.value),
         };
@@ -138,7 +138,7 @@ impl AskTell {
         let trial = self.study.trial(number).map_err(|error| error.to_string())?;
         Ok(json!(BestPoint {
             number,
-            params: trial.parameters.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
+            params: json_object(&trial.parameters),
             value: trial.value,
             predicted: model.map(|best| best.predicted),
         }))

@@ -228,7 +228,11 @@ impl Default for SimConfig {
 impl SimConfig {
     /// Reads and checks the text of a `simulator.toml`.
     pub fn from_toml(text: &str) -> Result<SimConfig, SimError> {
-        let config: SimConfig = toml::from_str(text).map_err(|e| SimError::Syntax { reason: e.to_string() })?;
+        let syntax = |reason: String| SimError::Syntax { reason };
+        let table: toml::Table = toml::from_str(text).map_err(|e| syntax(e.to_string()))?;
+        // As `config` reads it: by another way, the fields of thirteen structs would be compiled once more.
+        let config: SimConfig =
+            serde_path_to_error::deserialize(toml::Value::Table(table)).map_err(|e| syntax(e.to_string()))?;
         config.check()?;
         Ok(config)
     }

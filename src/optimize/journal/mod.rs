@@ -125,6 +125,14 @@ impl Journal {
         &mut self,
         mut decide: impl FnMut(&JournalState) -> Result<Vec<Operation>, E>,
     ) -> Result<Vec<Applied>, E> {
+        self.append_decided(&mut decide)
+    }
+
+    /// [`Journal::commit`], compiled once for all of its callers.
+    fn append_decided<E: From<JournalError>>(
+        &mut self,
+        decide: &mut dyn FnMut(&JournalState) -> Result<Vec<Operation>, E>,
+    ) -> Result<Vec<Applied>, E> {
         loop {
             let lock = if let JournalBackend::File(file) = &self.backend { Some(file.lock()?) } else { None };
             let (_, tail) = self.apply_lines()?;

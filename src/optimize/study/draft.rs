@@ -5,7 +5,7 @@ use crate::optimize::ask::{Ask, Draws, Expectation};
 use crate::optimize::journal::{AttributeKind, Operation};
 use crate::optimize::sampler::{self, propose};
 use crate::optimize::space::{Parameter, Range};
-use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, value_of};
+use crate::optimize::trial::{Distribution, FIXED_PARAMS, Trial, TrialState, announcement, json_object, value_of};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -139,7 +139,7 @@ impl Study {
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
     ) -> Result<u32, StudyError> {
-        self.begin_if(draft, overrides, attributes, TrialState::Running, |_| true)
+        self.begin_if(draft, overrides, attributes, TrialState::Running, &|_| true)
     }
 
     /// [`Study::begin`] if `room`, called with all trials while the journal is locked, returns true: workers on a shared
@@ -151,7 +151,7 @@ impl Study {
         overrides: &[(String, f64)],
         attributes: &[(String, Value)],
         state: TrialState,
-        room: impl Fn(&[Trial]) -> bool,
+        room: &dyn Fn(&[Trial]) -> bool,
     ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };
@@ -179,8 +179,7 @@ impl Study {
             };
             let mut system = announcement(&draft.joint);
             if !given.is_empty() {
-                let object = given.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
-                system.push((FIXED_PARAMS.to_owned(), Value::Object(object)));
+                system.push((FIXED_PARAMS.to_owned(), json_object(&given)));
             }
             system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
             let set =

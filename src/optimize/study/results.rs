@@ -1,12 +1,12 @@
 //! Changes of trials: attributes, outcomes, the queue.
 
 use jiff::Timestamp;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::best::MODEL_BEST;
 use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attributes};
 use crate::optimize::journal::{Applied, JournalError, Operation};
-use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange};
+use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange, json_object};
 
 impl Study {
     /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms. A finished trial is immutable
@@ -29,7 +29,7 @@ impl Study {
     /// # Errors
     /// [`StudyError::Value`] if the value is not a number; [`StudyError::State`] if the trial has not begun.
     pub fn tell(&mut self, trial: u32, outcome: Outcome) -> Result<TellOutcome, StudyError> {
-        self.tell_if(trial, outcome, &[], |_| true)
+        self.tell_if(trial, outcome, &[], &|_| true)
     }
 
     /// Sets user attributes and finishes a trial in one commit, if `holds(trial)` is true while the journal is locked.
@@ -40,7 +40,7 @@ impl Study {
         trial: u32,
         outcome: Outcome,
         attributes: &[(String, Value)],
-        holds: impl Fn(&Trial) -> bool,
+        holds: &dyn Fn(&Trial) -> bool,
     ) -> Result<TellOutcome, StudyError> {
         let id = self.trial(trial)?.id;
         let (state, values) = match outcome {
@@ -91,7 +91,7 @@ impl Study {
     /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number, or
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid parameter.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {
-        let queued = self.enqueue_unless(parameters, attributes, |_| false)?;
+        let queued = self.enqueue_unless(parameters, attributes, &|_| false)?;
         queued.ok_or_else(|| StudyError::Gone(self.options.name.clone()))
     }
 
@@ -101,14 +101,13 @@ impl Study {
         &mut self,
         parameters: &[(String, f64)],
         attributes: &[(String, Value)],
-        done: impl Fn(&[Trial]) -> bool,
+        done: &dyn Fn(&[Trial]) -> bool,
     ) -> Result<Option<u32>, StudyError> {
         self.check_parameters(parameters)?;
-        let fixed: Map<String, Value> = parameters.iter().map(|(n, v)| (n.clone(), Value::from(*v))).collect();
         let template = Trial {
             state: TrialState::Waiting,
             user_attributes: attributes.iter().cloned().collect(),
-            system_attributes: [(FIXED_PARAMS.to_owned(), Value::Object(fixed))].into(),
+            system_attributes: [(FIXED_PARAMS.to_owned(), json_object(parameters))].into(),
             ..Trial::default()
         };
         let study = self.id;

@@ -199,7 +199,7 @@ pub fn queue_repeat(
     attributes: &[(String, Value)],
 ) -> Result<Option<u32>, StudyError> {
     let Some(running) = running(study) else { return Ok(None) };
-    study.enqueue_unless(parameters, attributes, |trials| running.left(trials) == 0)
+    study.enqueue_unless(parameters, attributes, &|trials| running.left(trials) == 0)
 }
 
 impl RunningConfirmation {

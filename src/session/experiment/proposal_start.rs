@@ -186,7 +186,7 @@ impl Experiment {
             }
             None => TrialState::Running,
         };
-        let begun = self.study.begin_if(&draft, &overrides, &attributes, state, room);
+        let begun = self.study.begin_if(&draft, &overrides, &attributes, state, &room);
         let number = match begun {
             Ok(number) => number,
             Err(StudyError::StaleDraft { .. } | StudyError::Full) => {

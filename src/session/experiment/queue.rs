@@ -108,7 +108,7 @@ fn close_all(study: &mut Study, trials: &[Trial], cause: &str) -> Result<Vec<Str
         };
         // A trial that was judged since it was read is not abandoned.
         let unchanged = |now: &Trial| now.user_attributes == trial.user_attributes;
-        if study.tell_if(trial.number, outcome, &last, unchanged)? == TellOutcome::Recorded {
+        if study.tell_if(trial.number, outcome, &last, &unchanged)? == TellOutcome::Recorded {
             log.push(format!("trial {} was {result}", trial.number));
         }
     }
@@ -140,6 +140,6 @@ pub fn queue_again(
     origin: &Origin,
 ) -> Result<Option<u32>, StudyError> {
     let repeats = |other: &Trial| Origin::of_trial(other).parent == Some(parent);
-    let queued = study.enqueue_unless(parameters, &origin.attributes(), |trials| trials.iter().any(repeats))?;
+    let queued = study.enqueue_unless(parameters, &origin.attributes(), &|trials| trials.iter().any(repeats))?;
     Ok(queued.or_else(|| study.trials().iter().find(|trial| repeats(trial)).map(|trial| trial.number)))
 }

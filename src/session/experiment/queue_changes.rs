@@ -17,7 +17,7 @@ impl Experiment {
         let mut removed = Origin::of_trial(self.study.trial(trial)?).attributes();
         removed.extend(attributes::write(&RemovedAttributes { verdict: Verdict::Void, cause: REMOVED }));
         let waits = |trial: &Trial| trial.state == TrialState::Waiting;
-        if self.study.tell_if(trial, Outcome::Fail, &removed, waits)? != TellOutcome::Recorded {
+        if self.study.tell_if(trial, Outcome::Fail, &removed, &waits)? != TellOutcome::Recorded {
             return not_now(format!("trial {trial} has just begun elsewhere"));
         }
         self.propose_after_change(proposed)

@@ -110,7 +110,7 @@ impl Experiment {
         let cause = "given up between its repeats".to_owned();
         let void = TrialRecord { verdict: Some(Verdict::Void), cause, ..row.clone() };
         let judged = attributes::write(&JudgedAttributes::of(&void, false));
-        let told = self.study.tell_if(trial, Outcome::Fail, &judged, |_| true)?;
+        let told = self.study.tell_if(trial, Outcome::Fail, &judged, &|_| true)?;
         self.state = ExperimentState::Finished;
         if told == TellOutcome::AlreadyFinished {
             self.rows.remove(&trial);
