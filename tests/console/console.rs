@@ -25,6 +25,7 @@ mod connection;
 mod dialogs;
 mod evaluate;
 mod export;
+mod first_user;
 mod graphics;
 mod guard;
 mod health_view;

@@ -306,6 +306,20 @@ fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
     assert!(told.clone().any(|line| line.contains(&value.unwrap().to_string())), "{text}");
 }
 
+/// Regression: a skipped proposal could be judged a fall; it counted for the budget then and was reported to the sampler.
+#[test]
+fn a_trial_that_was_not_run_has_no_verdict_to_change() {
+    let mut experiment = experiment(5);
+    let skipped = experiment.proposal().unwrap().trial;
+    skip(&mut experiment);
+    accept(&mut experiment);
+    for verdict in Verdict::ALL {
+        let error = experiment.change_verdict(skipped, verdict, "it fell").unwrap_err().to_string();
+        assert_eq!(error, format!("trial {skipped} was not run: it has no verdict"));
+    }
+    assert_eq!(experiment.counted(), 1);
+}
+
 #[test]
 fn a_verdict_cannot_be_changed_during_a_trial() {
     let mut experiment = experiment(5);

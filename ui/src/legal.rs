@@ -293,15 +293,19 @@ fn may_judge(model: &Model, verdict: Verdict) -> Legality {
         return require(verdict != Verdict::Accept || value.is_some(), &reason);
     }
     require(!model.session.stage_is(ExperimentStage::Running), "a trial is running")?;
-    let row = model.selected_trial().filter(|_| model.view == View::Trials);
-    let Some((trial, before)) = row.and_then(|row| Some((row.trial, row.verdict?))) else {
+    let row = model.selected_trial().filter(|row| model.view == View::Trials && row.verdict.is_some());
+    let Some(row) = row else {
         return refuse("no trial waits for a verdict; in Trials, select a judged one to change it");
     };
+    let trial = row.trial;
+    require(!row.was_not_run(), &format!("trial {trial} was not run: it has no verdict"))?;
     if model.session.undoable() == Some(trial) {
         let undo = model.keymap.key(Action::Undo);
         return refuse(format!("the verdict of trial {trial} is the last one: {undo} takes it back"));
     }
-    require(before != verdict, &format!("trial {trial} is {} already", verdict.name()))
+    require(row.verdict != Some(verdict), &format!("trial {trial} is {} already", verdict.name()))?;
+    let has_value = verdict != Verdict::Accept || model.session.value_if_accepted(row).is_some();
+    require(has_value, &format!("nothing was measured in trial {trial}: it cannot be accepted"))
 }
 
 fn may_rerun(model: &Model) -> Legality {

@@ -11,8 +11,8 @@ use crate::trial::{CHANGED, Verdict};
 impl Experiment {
     /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
     /// sampler proposes again from the changed history; the operator's changes of the open proposal stay.
-    /// Refused during a trial, without a reason, for a trial without a final verdict or with several rollouts, for the verdict
-    /// that it has, and for an accepted trial without a value.
+    /// Refused during a trial, without a reason, for a trial that was not run, without a final verdict or with several rollouts, for the
+    /// verdict that it has, and for an accepted trial without a value.
     pub fn change_verdict(&mut self, trial: u32, verdict: Verdict, reason: &str) -> Result<Verdict, RequestRefusal> {
         self.must_be_idle()?;
         let reason = reason.trim();
@@ -21,6 +21,9 @@ impl Experiment {
             return not_now("its verdict is the last one: undo takes it back");
         }
         let Some(before) = row.verdict else { return not_now(format!("trial {trial} has no verdict yet")) };
+        if row.was_not_run() {
+            return not_now(format!("trial {trial} was not run: it has no verdict"));
+        }
         if before == verdict {
             return not_now(format!("trial {trial} is {} already", verdict.name()));
         }
