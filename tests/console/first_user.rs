@@ -44,3 +44,11 @@ fn a_trial_without_a_measurement_is_not_accepted_before_a_reason_is_asked_for() 
     console.press(&["f"]);
     assert_shows(&console.screen(80, 24), &["Trial #2: void becomes fall. Why?"]);
 }
+
+/// Regression: it was said to be recorded in an earlier session.
+#[test]
+fn a_trial_that_was_not_run_has_no_signals_to_show() {
+    let mut console = with_a_skipped_trial();
+    console.press(&["2", "Home", "Down", "c"]);
+    assert_eq!(console.said(), "trial 1 was not run");
+}

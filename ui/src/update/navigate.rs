@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use quadfrog::recording::record::LogLevel;
-use quadfrog::trial::Verdict;
+use quadfrog::trial::{TrialRecord, Verdict};
 use strum::VariantArray;
 
 use super::request::reply;
@@ -150,6 +150,9 @@ fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
 
 /// Returns the reason for which the signals of a trial are not here, and the place where they are.
 fn no_signals(model: &Model, trial: u32) -> String {
+    if model.trial(trial).is_some_and(TrialRecord::was_not_run) {
+        return format!("trial {trial} was not run");
+    }
     if let Some(timeline) = &model.timeline {
         return match timeline.has_ticks_of(trial) {
             true => {
