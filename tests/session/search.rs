@@ -369,6 +369,34 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("no confirmation of the best is running"));
 }
 
+/// Regressions: a trial that was queued after the last repeat said the result again, and the result did not say that the later trial
+/// is higher, nor how many jumps were wanted.
+#[test]
+fn the_result_of_a_confirmation_is_said_once_and_names_a_later_trial_that_is_higher() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    (0..5).for_each(|_| jump(&mut experiment, 0.0));
+    assert_eq!(experiment.confirm_best(3).unwrap().len(), 3);
+    assert_eq!(experiment.least_repeats(), 6, "more than were asked for");
+    (0..3).for_each(|_| jump(&mut experiment, 0.0));
+    let said = experiment.take_conclusion().expect("the last repeat has ended it");
+    assert!(said.ends_with("; each point needs 3 jumps to be compared"), "{said}");
+    let mut news = News::default();
+    // Before the next jump the queue and the search change, and the queued point is higher.
+    experiment.enqueue(&[("f0".into(), 1.1), ("Fx".into(), 100.0), ("Fz".into(), 240.0)]).unwrap();
+    experiment.fix("Fx", 60.0, 2).unwrap();
+    let spec = approve(&mut experiment);
+    experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 5.0), 2);
+    experiment.judge(Verdict::Accept, false).unwrap();
+    assert_eq!(experiment.take_conclusion(), None);
+    told(&mut experiment, &mut news);
+    assert_eq!(news.log.iter().filter(|line| line.contains("used up")).count(), 1, "{:?}", news.log);
+    experiment.close().unwrap();
+    let kept = confirmation_in_words(&study_in(folder.path())).expect("it is kept");
+    let later = format!("; each point needs 3 jumps to be compared; trial {}, later, is higher: 5.000", spec.trial);
+    assert!(kept.ends_with(&later) && kept.contains("leads without a confidence"), "{kept}");
+}
+
 /// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.
 #[test]
 fn the_verdict_that_ended_a_confirmation_can_be_undone() {

@@ -5,6 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::attributes::{self, Conclusion, RunningConfirmation, StudyAttributes};
+use crate::optimize::ask::Direction;
 use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
@@ -26,12 +27,14 @@ pub struct BestConfirmation {
     confidence: f64,
     /// Conclusion that is not written yet, because the last verdict can still be undone.
     concluded: Option<Conclusion>,
+    /// Conclusion that was reported last: each is reported once.
+    reported: Option<Conclusion>,
     published: Vec<PointRecord>,
 }
 
 impl BestConfirmation {
     pub fn new(contenders: u32, confidence: f64) -> BestConfirmation {
-        BestConfirmation { contenders, confidence, concluded: None, published: Vec::new() }
+        BestConfirmation { contenders, confidence, concluded: None, reported: None, published: Vec::new() }
     }
 
     /// Returns the first trials of the points that a confirmation in `study` would compare.
@@ -49,7 +52,7 @@ impl BestConfirmation {
         }
         let confirm = RunningConfirmation { trials, repeats, from: study.trials().len() as u32 };
         study.annotate_study(&attributes::write(&Started { confirm, confirmed: None }))?;
-        self.concluded = None;
+        (self.concluded, self.reported) = (None, None);
         Ok(())
     }
 
@@ -66,8 +69,18 @@ impl BestConfirmation {
         self.concluded = None;
     }
 
-    pub fn conclude(&mut self, conclusion: Conclusion) {
+    /// Keeps a conclusion. Returns whether it is to be reported: it has not been yet.
+    pub fn conclude(&mut self, conclusion: Conclusion) -> bool {
+        let news = self.reported.as_ref() != Some(&conclusion);
+        self.reported = Some(conclusion.clone());
         self.concluded = Some(conclusion);
+        news
+    }
+
+    /// Lets the next conclusion be reported although it may be equal to the last one: the verdict that has ended the repeats was
+    /// taken back.
+    pub fn forget_report(&mut self) {
+        self.reported = None;
     }
 
     /// Writes the conclusion, once no verdict that it rests on can be undone any more.
@@ -85,6 +98,7 @@ impl BestConfirmation {
         let Some(running) = running(study) else { return NextRepeat::None };
         let direction = study.options().direction;
         let compared = compared(&running.trials, study);
+        let unit = unit_of(study);
         let Some(first) = compared.first() else { return NextRepeat::None };
         let over = |leader: usize, confidence: f64, sure: bool, message: String| {
             let (trials, leader) = (running.trials.clone(), compared[leader].trials[0]);
@@ -97,7 +111,7 @@ impl BestConfirmation {
         match confirm(&compared, direction, self.confidence) {
             Confirmation::Leads(leader, confidence) => {
                 let confidence = if varies(&compared) { confidence } else { NO_CONFIDENCE };
-                over(leader, confidence, true, format!("confirmed: {}", lead_text(&compared, leader, confidence)))
+                over(leader, confidence, true, format!("confirmed: {}", lead_text(&compared, leader, confidence, unit)))
             }
             Confirmation::Repeat(point) if running.left(study.trials()) > 0 => {
                 match study.trial(compared[point].trials[0]) {
@@ -113,9 +127,9 @@ impl BestConfirmation {
                 let rank = rank(&compared, direction);
                 let (confidence, short) = match repeated(&compared) {
                     true => (rank.confidence, format!("short of {:.0} %", 100.0 * self.confidence)),
-                    false => (NO_CONFIDENCE, format!("each point needs {LEAST_REPEATS} jumps to be compared")),
+                    false => (NO_CONFIDENCE, too_few_jumps()),
                 };
-                let lead = lead_text(&compared, rank.leader, confidence);
+                let lead = lead_text(&compared, rank.leader, confidence, unit);
                 over(rank.leader, confidence, false, format!("the repeats are used up: {lead}; {short}"))
             }
         }
@@ -184,8 +198,46 @@ pub fn confirmation_in_words(study: &Study) -> Option<String> {
     let concluded = kept.confirmed?;
     let points = compared(&concluded.trials, study);
     let leader = points.iter().position(|point| point.trials.contains(&concluded.leader))?;
-    let short = if concluded.sure { "" } else { ", less than was wanted" };
-    Some(format!("{}{short}", lead_text(&points, leader, kept_confidence(&concluded, &points))))
+    let short = match (concluded.sure, repeated(&points)) {
+        (true, _) => String::new(),
+        _ if points.len() < 2 => "; no other point was left to compare".to_owned(),
+        (false, true) => "; the confidence is below the wanted one".to_owned(),
+        (false, false) => format!("; {}", too_few_jumps()),
+    };
+    let lead = lead_text(&points, leader, kept_confidence(&concluded, &points), unit_of(study));
+    Some(lead + &short + &later_in_words(study, &points, leader))
+}
+
+/// Returns in words the best point that was first run after the last repeat, if it is better than the leading one.
+fn later_in_words(study: &Study, compared: &[RepeatedPoint], leader: usize) -> String {
+    let direction = study.options().direction;
+    let last = compared.iter().flat_map(|point| &point.trials).max();
+    let is_later = |point: &RepeatedPoint| point.without_fall > 0 && point.trials.first() > last;
+    let later = contenders(study.trials(), direction, usize::MAX).into_iter().find(is_later);
+    match later.filter(|point| direction.best_first(point.mean(), compared[leader].mean()).is_lt()) {
+        Some(point) => {
+            let better = if direction == Direction::Maximize { "higher" } else { "lower" };
+            let (trial, mean, unit) = (point.trials[0], point.mean(), unit_of(study));
+            format!("; trial {trial}, later, is {better}: {mean:.3} {unit}").trim_end().to_owned()
+        }
+        None => String::new(),
+    }
+}
+
+/// Returns the unit of the objective; empty for a study of another program.
+fn unit_of(study: &Study) -> String {
+    let kept = StudyAttributes::of(study.attributes());
+    kept.unit.or(kept.task.map(|task| task.unit().to_owned())).unwrap_or_default()
+}
+
+/// Returns the reason for which points that ran too seldom cannot be compared.
+fn too_few_jumps() -> String {
+    format!("each point needs {LEAST_REPEATS} jumps to be compared")
+}
+
+/// Returns the number of repeats that the points of these first trials need at least to be compared.
+pub fn least_repeats(first_trials: &[u32], study: &Study) -> u32 {
+    compared(first_trials, study).iter().map(|point| LEAST_REPEATS.saturating_sub(point.repeats()) as u32).sum()
 }
 
 pub fn running(study: &Study) -> Option<RunningConfirmation> {
@@ -242,7 +294,7 @@ fn kept_confidence(concluded: &Conclusion, compared: &[RepeatedPoint]) -> f64 {
 }
 
 /// The leading point in words.
-fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64) -> String {
+fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64, unit: String) -> String {
     let point = &compared[leader];
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
     let sure = match confidence > NO_CONFIDENCE {
@@ -252,10 +304,11 @@ fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64) -> Stri
         }
         false => "without a confidence".to_owned(),
     };
+    let mean = format!("{:.3}{spread} {unit}", point.mean());
     format!(
-        "the point of trial {} leads {sure}: mean {:.3}{spread}, stood {} of {}",
+        "the point of trial {} leads {sure}: mean {}, stood {} of {}",
         point.trials[0],
-        point.mean(),
+        mean.trim_end(),
         point.without_fall,
         point.repeats()
     )

@@ -29,17 +29,20 @@ impl Experiment {
             return Ok(());
         }
         let mut study = self.study_with_verdict()?;
-        if study.waiting().next().is_none() {
+        // A point that was queued runs before a repeat, but does not delay the result of the last one.
+        let waits = study.waiting().next().is_some();
+        if !study.waiting().any(attributes::confirms) {
             match self.confirmation.next(&study) {
-                NextRepeat::Repeat(first) => {
+                NextRepeat::Repeat(first) if !waits => {
                     study.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
                 }
                 NextRepeat::Over(conclusion, message) => {
-                    self.log(message.clone());
-                    self.concluded = Some(message);
-                    self.confirmation.conclude(conclusion);
+                    if self.confirmation.conclude(conclusion) {
+                        self.log(message.clone());
+                        self.concluded = Some(message);
+                    }
                 }
-                NextRepeat::None => {}
+                NextRepeat::Repeat(_) | NextRepeat::None => {}
             }
         }
         if self.pending_verdict.is_none() {

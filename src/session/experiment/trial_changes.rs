@@ -212,6 +212,12 @@ impl Experiment {
         Ok(trials)
     }
 
+    /// Returns the number of repeats that the running confirmation needs at least to compare its points; 0 while none runs.
+    pub fn least_repeats(&self) -> u32 {
+        let running = confirmation::running(&self.study);
+        running.map_or(0, |running| confirmation::least_repeats(&running.trials, &self.study))
+    }
+
     /// Sets the note of a trial.
     /// Refused when there is no such trial.
     pub fn note(&mut self, trial: u32, text: &str) -> Result<(), RequestRefusal> {
