@@ -52,3 +52,68 @@ fn a_trial_that_was_not_run_has_no_signals_to_show() {
     console.press(&["2", "Home", "Down", "c"]);
     assert_eq!(console.said(), "trial 1 was not run");
 }
+
+fn point(trials: Vec<u32>, mean: f64, confidence: Option<f64>) -> PointRecord {
+    PointRecord {
+        parameters: vec![("f0".into(), 1.25)].into(),
+        without_fall: trials.len() as u32,
+        trials,
+        mean,
+        deviation: Some(0.0),
+        contender: true,
+        confidence,
+    }
+}
+
+/// A finished study of which three points were compared without a confidence.
+fn compared() -> Console {
+    let mut console = Console::ready();
+    console.judged(1);
+    console.record(Record::Points(vec![
+        point(vec![3, 20], 0.61, None),
+        point(vec![17, 21], 0.688, None),
+        point(vec![5, 22], 0.6, None),
+    ]));
+    console.record(Record::Search(SearchStatus { budget: 20, counted: 20, ..SearchStatus::default() }));
+    console
+}
+
+/// Regression: all points were called behind, also the leading one.
+#[test]
+fn the_leading_point_leads_without_a_confidence_too() {
+    let mut console = compared();
+    console.stage(ExperimentStage::Finished, 22);
+    let leads = |screen: &str| {
+        assert_shows(&line_with(screen, "#17 "), &["leads"]);
+        assert!(!line_with(screen, "#17 ").contains('%'), "{screen}");
+    };
+    leads(&console.screen(80, 24));
+    leads(&console.screen(200, 60));
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    leads(&screen);
+    for behind in ["#3 ", "#5 "] {
+        assert_shows(&line_with(&screen, behind), &["behind"]);
+    }
+    assert_eq!(screen.matches("  leads").count(), 1, "{screen}");
+}
+
+/// Regression: the result of a confirmation was shown beside a better trial without a word about that.
+#[test]
+fn a_result_says_that_a_later_trial_is_higher() {
+    let mut console = compared();
+    let later = |console: &mut Console, number, value| {
+        let row = TrialRecord { value: Some(value), ..trial(number, Some(Verdict::Accept), None) };
+        console.record(Record::Trial(row));
+    };
+    console.stage(ExperimentStage::Finished, 22);
+    assert_shows(
+        console.said(),
+        &["the point of trial 17 leads without a confidence: mean 0.688 +- 0.000 m, stood 2 of 2"],
+    );
+    assert!(!console.said().contains("later"), "{}", console.said());
+    later(&mut console, 28, 0.706);
+    console.stage(ExperimentStage::Proposed, 29);
+    console.stage(ExperimentStage::Finished, 28);
+    assert_shows(console.said(), &["stood 2 of 2; trial 28, later, is higher: 0.706 m"]);
+}

@@ -40,7 +40,7 @@ fn the_numbers_of_repeated_points_have_names_at_80_columns() {
     assert_shows(&line_with(&screen, "landed"), &["#   landed mean, std m   leads"]);
     assert_shows(&screen, &["#12 2/2    0.442 ±0.050  96 %", "#30 9/10   -0.410 ±0.050\n"]);
     let screen = repeated("rad", None).screen(80, 24);
-    assert_shows(&screen, &["#   landed mean, std rad\n", "#12 2/2    0.442 ±0.050\n"]);
+    assert_shows(&screen, &["#   landed mean, std rad\n", "#12 2/2    0.442 ±0.050  leads\n"]);
     // On a wide terminal each line has its words.
     assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["2/2 landed  0.442 m ±0.050  leads, 96 %"]);
     // A study without repeats has no such line.

@@ -3,8 +3,8 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ObjectiveRule, ParameterInfo, Proposal, ProposalInsight, ProposedParameter, QueuedPoint,
-    SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
+    ExperimentStage, ObjectiveRule, ParameterInfo, PointRecord, Proposal, ProposalInsight, ProposedParameter,
+    QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -169,21 +169,47 @@ impl SessionModel {
         }
     }
 
+    /// The leading point of a confirmation of the best: with its confidence while it runs, afterwards without one, too.
+    pub fn leading_point(&self) -> Option<&PointRecord> {
+        let points = &self.trials.points;
+        let contenders = || points.iter().filter(|point| point.contender).rev();
+        points.iter().find(|point| point.confidence.is_some()).or_else(|| {
+            let ended = self.confirming().is_none();
+            // The earliest of equals.
+            contenders().filter(|_| ended).max_by(|a, b| a.mean.total_cmp(&b.mean))
+        })
+    }
+
     /// Result of the confirmation of the best; none while it runs and without one.
     pub fn confirmation(&self) -> Option<String> {
-        let ended = self.confirming().is_none();
-        let (point, confidence) =
-            self.trials.points.iter().filter(|_| ended).find_map(|point| Some((point, point.confidence?)))?;
+        let point = self.leading_point().filter(|_| self.confirming().is_none())?;
         let spread = point.deviation.map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
-        Some(format!(
-            "the point of trial {} leads with {:.1} % confidence: mean {:.3}{spread} {}, stood {} of {}",
-            point.trials.first()?,
-            100.0 * confidence,
-            point.mean,
-            self.info.unit,
-            point.without_fall,
-            point.trials.len()
-        ))
+        let sure = match point.confidence {
+            Some(confidence) => format!("with {:.1} % confidence", 100.0 * confidence),
+            None => "without a confidence".to_owned(),
+        };
+        let unit = &self.info.unit;
+        let (first, mean, stood, of) = (point.trials.first()?, point.mean, point.without_fall, point.trials.len());
+        let lead =
+            format!("the point of trial {first} leads {sure}: mean {mean:.3}{spread} {unit}, stood {stood} of {of}");
+        // Those that were first run after the last repeat.
+        let last =
+            self.trials.points.iter().filter(|point| point.contender).filter_map(|point| point.trials.last()).max();
+        let is_later = |trial: &u32| Some(trial) > last;
+        let later = self.trials.best_so_far().last().filter(|best| is_later(&best.trial));
+        let later = later.and_then(|best| best.value.map(|value| (best.trial, value)));
+        match later.filter(|(_, value)| *value > mean) {
+            Some((trial, value)) => Some(format!("{lead}; trial {trial}, later, is higher: {value:.3} {unit}")),
+            None => Some(lead),
+        }
+    }
+
+    /// The trial that is proposed before any has jumped, in words.
+    pub fn no_trial_yet(&self) -> String {
+        match self.open_proposal() {
+            Some(proposal) => format!("trial #{} has not jumped yet", proposal.trial),
+            None => "there is no trial yet".to_owned(),
+        }
     }
 
     pub(crate) fn budget(&self) -> u32 {

@@ -21,22 +21,45 @@ pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'s
         return points.into_iter().map(|point| line(session, theme, point)).collect();
     }
     let names = points.first().map(|_| {
+        // Without a confidence the line of the leading point says it.
         let leads = if points.iter().any(|point| point.confidence.is_some()) { "leads" } else { "" };
         let mean = format!("mean, std {}", session.info.unit);
         let names = format!(" {:<4}{:<7}{mean:<MEAN_WIDTH$}{leads}", "#", "landed");
         Line::from(span(theme, Role::Quiet, names.trim_end()))
     });
-    names.into_iter().chain(points.into_iter().map(|point| narrow_line(theme, point))).collect()
+    names.into_iter().chain(points.into_iter().map(|point| narrow_line(session, theme, point))).collect()
+}
+
+/// The lines of [`lines`] as far as `rows` rows have room: whole points below the names of their numbers, and the number of those
+/// that are left out.
+pub fn within(lines: Vec<Line<'static>>, theme: &Theme, width: usize, rows: usize) -> Vec<Line<'static>> {
+    if lines.len() <= rows {
+        return lines;
+    }
+    let names = usize::from(width < WORDS_FROM);
+    let points = lines.len() - names;
+    // A row names those that are left out; the names stand over a point or not at all.
+    let shown = rows.saturating_sub(names + 1);
+    let sign = match shown {
+        0 => format!(" {points} points have no room"),
+        shown => format!(" {} more have no room", points - shown),
+    };
+    let kept = if shown == 0 { 0 } else { names + shown };
+    lines.into_iter().take(kept).chain([Line::from(span(theme, Role::Quiet, sign))]).take(rows).collect()
 }
 
 /// A line below the names of its numbers.
-fn narrow_line(theme: &Theme, point: &PointRecord) -> Line<'static> {
+fn narrow_line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Line<'static> {
     let first = point.trials.first().map_or(String::new(), |trial| format!("#{trial}"));
     let landed = format!("{}/{}", point.without_fall, point.trials.len());
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
     let mean = number(point.mean);
     let room = MEAN_WIDTH.saturating_sub(mean.chars().count());
-    let confidence = point.confidence.map_or(String::new(), |confidence| format!("{:.0} %", confidence * 100.0));
+    let confidence = match point.confidence {
+        Some(confidence) => format!("{:.0} %", confidence * 100.0),
+        None if leads(session, point) => "leads".to_owned(),
+        None => String::new(),
+    };
     Line::from(vec![
         span(theme, Role::Quiet, format!(" {first:<4}")),
         Span::raw(format!("{landed:<7}{mean}")),
@@ -56,11 +79,18 @@ fn line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Line<'sta
     ];
     if let Some(confidence) = point.confidence {
         spans.push(span(theme, Role::Good, format!("  leads, {:.0} %", confidence * 100.0)));
+    } else if leads(session, point) {
+        spans.push(span(theme, Role::Good, "  leads"));
     } else if point.contender {
         let state = if is_decided(session) { "  behind" } else { "  contends" };
         spans.push(span(theme, Role::Quiet, state));
     }
     Line::from(spans)
+}
+
+/// Whether it is the leading point of a confirmation.
+fn leads(session: &SessionModel, point: &PointRecord) -> bool {
+    session.leading_point().is_some_and(|leading| leading.trials == point.trials)
 }
 
 /// Whether the confirmation is over, or its leader is certain but for the rounding: no other point contends any longer.
