@@ -117,3 +117,31 @@ fn a_result_says_that_a_later_trial_is_higher() {
     console.stage(ExperimentStage::Finished, 28);
     assert_shows(console.said(), &["stood 2 of 2; trial 28, later, is higher: 0.706 m"]);
 }
+
+/// Regression: the names of the numbers stood over no point, and a point was left out without a sign.
+#[test]
+fn names_of_numbers_stand_over_a_point_and_points_that_are_left_out_are_counted() {
+    let mut console = compared();
+    console.record(Record::Points((0..4).map(|n| point(vec![n, 20 + n], 0.6, None)).collect()));
+    for confirming in [Some(3), None] {
+        console.record(Record::Search(SearchStatus { budget: 20, confirming, ..SearchStatus::default() }));
+        let stage = if confirming.is_some() { ExperimentStage::Proposed } else { ExperimentStage::Finished };
+        console.stage(stage, 0);
+        for rows in 18..50 {
+            let screen = console.screen(80, rows);
+            let points = (0..4).filter(|n| screen.contains(&format!(" #{n}  2/2 "))).count();
+            assert!(points > 0 || !screen.contains("landed mean, std"), "{screen}");
+            match points {
+                4 => assert!(!screen.contains("no room"), "{screen}"),
+                0 => {}
+                shown => assert_shows(&screen, &[&format!("{} more have no room", 4 - shown)]),
+            }
+        }
+        console.press(&["3"]);
+        let many = (0..9).map(|n| point(vec![n, 20 + n], 0.6, None)).collect();
+        console.record(Record::Points(many));
+        assert_shows(&console.screen(120, 40), &["5 more have no room"]);
+        console.press(&["1"]);
+        console.record(Record::Points((0..4).map(|n| point(vec![n, 20 + n], 0.6, None)).collect()));
+    }
+}

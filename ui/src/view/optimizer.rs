@@ -32,7 +32,8 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
         let body = heading(frame, repeats, theme, "Repeated points", "landed/repeats, mean, std");
-        frame.render_widget(Paragraph::new(repeated), body);
+        let lines = points::within(repeated, theme, usize::from(body.width), usize::from(body.height));
+        frame.render_widget(Paragraph::new(lines), body);
     }
     let parameters = &session.info.parameters;
     if parameters.is_empty() {

@@ -19,22 +19,40 @@ use crate::theme::{Role, Theme};
 use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
-    let (title, lines) = content(model, usize::from(area.width));
+    let PanelText { title, lines, points } = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
-    frame.render_widget(Paragraph::new(wrap_all(&lines, usize::from(body.width), 1)), body);
+    let mut lines = wrap_all(&lines, usize::from(body.width), 1);
+    let room = usize::from(body.height).saturating_sub(lines.len());
+    lines.extend(points::within(points, &model.theme, usize::from(area.width), room));
+    frame.render_widget(Paragraph::new(lines), body);
+}
+
+/// The text of the panel.
+#[derive(Default)]
+struct PanelText {
+    title: String,
+    lines: Vec<Line<'static>>,
+    /// The repeated points below the lines, as far as they have room.
+    points: Vec<Line<'static>>,
+}
+
+impl PanelText {
+    fn new(title: impl Into<String>, lines: Vec<Line<'static>>) -> PanelText {
+        PanelText { title: title.into(), lines, points: Vec::new() }
+    }
 }
 
 /// The rows that the whole panel takes with that many columns.
 pub fn rows(model: &Model, width: u16) -> u16 {
-    let lines = content(model, usize::from(width)).1;
-    1 + wrap_all(&lines, usize::from(width), 1).len() as u16
+    let PanelText { lines, points, .. } = content(model, usize::from(width));
+    1 + (wrap_all(&lines, usize::from(width), 1).len() + points.len()) as u16
 }
 
-fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
+fn content(model: &Model, width: usize) -> PanelText {
     let (session, theme) = (&model.session, &model.theme);
     let stage = session.stage.map(|info| info.stage);
     if let Some(trial) = session.under_review() {
-        return (format!("Trial #{}: judge it", trial.trial), review(session, theme, trial));
+        return PanelText::new(format!("Trial #{}: judge it", trial.trial), review(session, theme, trial));
     }
     // A recording that begins within a trial.
     if session.proposal.is_none()
@@ -43,10 +61,10 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
         let as_run =
             |(name, value): &(String, f64)| ProposedParameter { name: name.clone(), value: *value, proposed: *value };
         let lines = trial.parameters.iter().map(|p| parameter(session, theme, &as_run(p), width)).collect();
-        return (format!("Trial #{} runs", trial.trial), lines);
+        return PanelText::new(format!("Trial #{} runs", trial.trial), lines);
     }
     match (stage, &session.proposal) {
-        (Some(ExperimentStage::Finished), _) => ("Study finished".to_owned(), finished(model, width)),
+        (Some(ExperimentStage::Finished), _) => finished(model, width),
         (_, Some(proposal)) => {
             let source = match stage {
                 Some(ExperimentStage::Running) => " runs".to_owned(),
@@ -75,11 +93,11 @@ fn content(model: &Model, width: usize) -> (String, Vec<Line<'static>>) {
             }
             if let Some(left) = session.confirming() {
                 lines.push(Line::from(span(theme, Role::Warning, format!(" confirming the best: {left} left"))));
-                lines.extend(points::lines(session, theme, width));
+                return PanelText { title, lines, points: points::lines(session, theme, width) };
             }
-            (title, lines)
+            PanelText::new(title, lines)
         }
-        _ => ("Proposal".to_owned(), vec![Line::from(span(theme, Role::Quiet, " none yet"))]),
+        _ => PanelText::new("Proposal", vec![Line::from(span(theme, Role::Quiet, " none yet"))]),
     }
 }
 
@@ -183,10 +201,11 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
     lines
 }
 
-fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
+fn finished(model: &Model, width: usize) -> PanelText {
     let (session, theme) = (&model.session, &model.theme);
+    let title = "Study finished";
     let Some(best) = session.trials.best() else {
-        return vec![Line::from(span(theme, Role::Quiet, " no trial was accepted"))];
+        return PanelText::new(title, vec![Line::from(span(theme, Role::Quiet, " no trial was accepted"))]);
     };
     let value = best.value.map(number).unwrap_or_default();
     let mut lines = vec![Line::from(vec![
@@ -214,6 +233,5 @@ fn finished(model: &Model, width: usize) -> Vec<Line<'static>> {
     if !offers.is_empty() && (width >= points::WORDS_FROM || repeated.is_empty()) {
         lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
     }
-    lines.extend(repeated);
-    lines
+    PanelText { points: repeated, ..PanelText::new(title, lines) }
 }
