@@ -79,7 +79,8 @@ impl TrialRecord {
         self.has_result() && self.source == ProposalSource::Confirm
     }
 
-    fn has_result(&self) -> bool {
+    /// Returns whether it has a value: accepted or fallen.
+    pub fn has_result(&self) -> bool {
         matches!(self.verdict, Some(Verdict::Accept | Verdict::Fall))
     }
 

@@ -22,6 +22,11 @@ fn with_a_skipped_trial() -> Console {
     console
 }
 
+/// The words of a screen with one space between them: a text in a box may take two lines.
+fn joined(screen: &str) -> String {
+    screen.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Regression: a skipped proposal could be judged a fall; it counted for the budget then, with the value 0.
 #[test]
 fn a_trial_that_was_not_run_is_not_judged() {
@@ -116,6 +121,26 @@ fn a_result_says_that_a_later_trial_is_higher() {
     console.stage(ExperimentStage::Proposed, 29);
     console.stage(ExperimentStage::Finished, 28);
     assert_shows(console.said(), &["stood 2 of 2; trial 28, later, is higher: 0.706 m"]);
+}
+
+/// Regression: three repeats over three points could decide nothing, which was said afterwards alone.
+#[test]
+fn the_dialog_of_a_confirmation_says_how_many_repeats_it_takes() {
+    let mut console = Console::ready();
+    console.model.contenders = Some(3);
+    for number in 0..5 {
+        let row = trial(number, Some(Verdict::Accept), None);
+        // The third point of the best three ran twice already.
+        let f0 = if number < 2 { 1.0 } else { 1.0 + f64::from(number) / 10.0 };
+        let parameters = vec![("f0".into(), f0), ("Fx".into(), 75.0), ("Fz".into(), 250.0)].into();
+        let value = if number < 2 { Some(0.43) } else { row.value };
+        console.record(Record::Trial(TrialRecord { parameters, value, ..row }));
+    }
+    console.press(&["K"]);
+    assert_shows(
+        &joined(&console.screen(80, 24)),
+        &["to compare them takes 5 repeats", "does not count for the budget"],
+    );
 }
 
 /// Regression: the names of the numbers stood over no point, and a point was left out without a sign.

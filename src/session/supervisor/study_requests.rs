@@ -131,7 +131,12 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
                 0 => "no more repeats".to_owned(),
                 _ => {
                     let most = if *repeats == 1 { "once".to_owned() } else { format!("{repeats} times") };
-                    format!("the points of trials {} are repeated, at most {most}", trials.join(", "))
+                    let least = experiment.least_repeats();
+                    let needed = match *repeats < least {
+                        true => format!("; to compare them takes {least}"),
+                        false => String::new(),
+                    };
+                    format!("the points of trials {} are repeated, at most {most}{needed}", trials.join(", "))
                 }
             }
         }

@@ -100,7 +100,7 @@ impl Notice {
     }
 }
 
-/// The robot, its limits and its ground, as far as they are known: by default nothing is.
+/// The robot, its limits, its ground and the rule that confirms the best, as far as they are known: by default nothing is.
 #[derive(Debug, Clone, Default)]
 pub struct RobotFacts {
     /// The robot's limits and geometry.
@@ -109,6 +109,8 @@ pub struct RobotFacts {
     pub fall_tilt_rad: Option<[f64; 2]>,
     /// The ground of the trials.
     pub ground: Option<TrialGround>,
+    /// Number of points that a confirmation of the best compares.
+    pub contenders: Option<usize>,
 }
 
 impl RobotFacts {
@@ -119,6 +121,7 @@ impl RobotFacts {
             description: Some(description),
             fall_tilt_rad: Some([fall.roll_rad, fall.pitch_rad]),
             ground: Some(TrialGround::new(config, backend, seed)),
+            contenders: Some(config.optimize.confirm.contenders as usize),
         }
     }
 }
@@ -138,6 +141,8 @@ pub struct Model {
     pub robot: Option<RobotDescription>,
     /// Largest roll and pitch before a trial is a fall, rad; none where they are not known.
     pub fall_tilt_rad: Option<[f64; 2]>,
+    /// Number of points that a confirmation of the best compares; none where it is not known.
+    pub contenders: Option<usize>,
     /// The ground of every trial; none where it is not known.
     pub trial_ground: Option<TrialGround>,
     /// The ground of the running trial, or of the last one.
@@ -212,6 +217,7 @@ impl Model {
             space_always_stops: settings.space_always_stops,
             robot: facts.description,
             fall_tilt_rad: facts.fall_tilt_rad,
+            contenders: facts.contenders,
             trial_ground: facts.ground,
             ground: facts.ground.and_then(|ground| ground.of(None)),
             clock: Duration::ZERO,

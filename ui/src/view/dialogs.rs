@@ -9,7 +9,7 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
-use quadfrog::session::operator_request::OperatorCheck;
+use quadfrog::session::operator_request::{OperatorCheck, counted};
 use quadfrog::trial::{Task, six_digits};
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -294,7 +294,13 @@ fn field(
         }
         Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
         Purpose::ConfirmBest => {
-            "the best points run again until one leads; each repeat is approved like any other".to_owned()
+            let needed = match model.contenders.map(|contenders| model.session.trials.least_repeats(contenders)) {
+                Some(least) if least > 0 => format!("; to compare them takes {}", counted(least as u32, "repeat")),
+                _ => String::new(),
+            };
+            format!(
+                "the best points run again until one leads{needed}; each repeat is approved, and does not count for the budget"
+            )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
         Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7, or best".to_owned(),
