@@ -38,6 +38,8 @@ pub struct ReportedStudy {
     pub other_gains_of_best: String,
     /// Result of the newest confirmation of the best, a sentence without its end; none without one.
     pub confirmation: Option<String>,
+    /// Parameters that the operator has fixed for some trials, each a sentence without its end.
+    pub fixed: Vec<String>,
     /// The best trial by the sampler's model; none without one.
     pub model_best: Option<PredictedTrial>,
     /// Largest torque of hip, thigh and calf, N m, and their no-load speeds, rad/s; none for an unknown robot.

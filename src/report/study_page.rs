@@ -177,6 +177,9 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
     let mut shown: Vec<&ReportedStudy> = Vec::new();
     for study in studies {
         section.paragraph(bounds(study));
+        if !study.fixed.is_empty() {
+            section.paragraph(format!("{}: {}.", title(study), study.fixed.join("; ")));
+        }
         if study.configuration.is_empty() {
             section.paragraph(format!("{}: no configuration was kept.", title(study)));
             continue;

@@ -170,3 +170,20 @@ fn names_of_numbers_stand_over_a_point_and_points_that_are_left_out_are_counted(
         console.record(Record::Points((0..4).map(|n| point(vec![n, 20 + n], 0.6, None)).collect()));
     }
 }
+
+/// The dialog that fixes a parameter says which trials use it up.
+#[test]
+fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {
+    let mut console = Console::ready();
+    let fx = SearchedParameter { name: "Fx".into(), low: 0.0, high: 150.0, least: 0.0, most: 200.0, fixed: None };
+    console.record(Record::Search(SearchStatus { parameters: vec![fx.clone()], ..SearchStatus::default() }));
+    console.press(&["4", "Down", "X"]);
+    assert_shows(&joined(&console.screen(80, 24)), &["a trial that is void or has another Fx uses up none"]);
+    let fixed = Some(FixedParameter { value: 75.0, trials: 3 });
+    console.record(Record::Search(SearchStatus {
+        parameters: vec![SearchedParameter { fixed, ..fx }],
+        ..SearchStatus::default()
+    }));
+    console.press(&["Esc"]);
+    assert_shows(&console.screen(80, 24), &["fixed at 75.00, 3 more"]);
+}

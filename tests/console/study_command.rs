@@ -377,8 +377,10 @@ fn fixed_parameters_and_a_confirmation_are_shown_as_sentences() {
     }
     fs::write(&journal, text).unwrap();
     let shown = program.text(&["study", "show", study.to_str().unwrap()]);
-    assert_shows(&shown, &["f0 was fixed at 0.971958 for 1 counted trial of the sampler, from trial 11"]);
+    assert_shows(&shown, &["f0 is fixed at 0.971958 for 1 trial that counts, from trial 11: 1 left"]);
     assert_shows(&shown, &["confirmation of the best: the point of trial 0 leads with 96.2 % confidence"]);
+    let report = program.text(&["report", study.to_str().unwrap()]);
+    assert_shows(&report, &["f0 is fixed at 0.971958 for 1 trial that counts"]);
     for raw in ["confirm:", "confirmed:", "fixed:", "model_best", "none"] {
         assert!(!shown.contains(raw), "{raw}:\n{shown}");
     }

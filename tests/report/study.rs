@@ -94,6 +94,7 @@ fn study(seed: u32, rows: Vec<TrialRecord>) -> ReportedStudy {
         best: Some(1),
         other_gains_of_best: String::new(),
         confirmation: None,
+        fixed: Vec::new(),
         model_best: None,
         limits: None,
         recordings: Recordings::default(),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
 use quadfrog::recording::record::Record;
-use quadfrog::session::experiment::{Experiment, RequestRefusal, confirmation_in_words};
+use quadfrog::session::experiment::{Experiment, RequestRefusal, confirmation_in_words, fixed_in_words};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
@@ -215,6 +215,29 @@ fn a_fixed_parameter_can_be_freed_and_overridden_and_leaves_queued_points_alone(
     experiment.fix("f0", 1.0, 2).unwrap();
     let error = experiment.fix("Fz", 200.0, 2).unwrap_err().to_string();
     assert!(error.contains("nothing would be left"), "{error}");
+}
+
+/// Regression: a trial whose other parameters were changed used one up, against the words of the answer; and the study did not say
+/// how many are left.
+#[test]
+fn the_study_says_for_how_many_trials_a_parameter_is_still_fixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.fix("Fx", 60.0, 2).unwrap();
+    let words = || fixed_in_words(&study_in(folder.path()));
+    assert_eq!(words(), ["Fx is fixed at 60 for 2 trials that count, from trial 0: 2 left"]);
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    accept(&mut experiment);
+    experiment.set_parameter("Fx", 70.0).unwrap();
+    accept(&mut experiment);
+    experiment.enqueue(&[("Fx".into(), 80.0)]).unwrap();
+    accept(&mut experiment);
+    experiment.close().unwrap();
+    assert_eq!(words(), ["Fx is fixed at 60 for 2 trials that count, from trial 0: 1 left"]);
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    experiment.close().unwrap();
+    assert_eq!(words(), ["Fx was fixed at 60 for 2 trials that count, from trial 0"]);
 }
 
 #[test]

@@ -42,6 +42,7 @@ pub fn report(session: &SessionModel, width: usize) -> Vec<String> {
         confirmation: session.confirmation(),
         best: session.trials.best().map(|best| best.trial),
         other_gains_of_best: session.trials.best().map_or(String::new(), |best| best.other_gains(&configured)),
+        fixed: Vec::new(),
         model_best: session.trials.model_best,
         limits: None,
         recordings: Recordings::default(),

@@ -10,7 +10,36 @@ use super::plan::ExperimentPlan;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter};
+use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, six_digits};
+
+impl FixedFrom {
+    /// Returns the number of trials for which `name` is still fixed. A trial uses one up that has the fixed value for that reason,
+    /// also where the operator has changed its other parameters, unless it is void.
+    fn trials_left(&self, name: &str, trials: &[Trial]) -> u32 {
+        let ran = |trial: &&Trial| {
+            trial.number >= self.from
+                && !matches!(trial.state, TrialState::Fail | TrialState::Waiting)
+                && TrialAttributes::of(trial).fixed.get(name) == Some(self.value)
+        };
+        self.trials.saturating_sub(trials.iter().filter(ran).count() as u32)
+    }
+}
+
+/// Returns a sentence without its end for each parameter that the operator has fixed for some trials and not freed since.
+pub fn fixed_in_words(study: &Study) -> Vec<String> {
+    let fixed = StudyAttributes::of(study.attributes()).fixed.unwrap_or_default();
+    let sentence = |(name, fixed): (&String, &FixedFrom)| {
+        let FixedFrom { value, trials, from } = fixed;
+        let (value, left) = (six_digits(*value), fixed.trials_left(name, study.trials()));
+        let trials =
+            if *trials == 1 { "1 trial that counts".to_owned() } else { format!("{trials} trials that count") };
+        match left {
+            0 => format!("{name} was fixed at {value} for {trials}, from trial {from}"),
+            left => format!("{name} is fixed at {value} for {trials}, from trial {from}: {left} left"),
+        }
+    };
+    fixed.iter().map(sentence).collect()
+}
 
 /// Differences of the search space from the configuration.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -63,13 +92,7 @@ impl SearchSettings {
     /// none.
     pub fn fixed(&self, trials: &[Trial]) -> BTreeMap<String, FixedParameter> {
         let left = |(name, fixed): (&String, &FixedFrom)| {
-            let ran = |trial: &&Trial| {
-                trial.number >= fixed.from
-                    && !matches!(trial.state, TrialState::Fail | TrialState::Waiting)
-                    && TrialAttributes::of(trial).fixed.get(name) == Some(fixed.value)
-            };
-            let ran = trials.iter().filter(ran).count() as u32;
-            let left = FixedParameter { value: fixed.value, trials: fixed.trials.saturating_sub(ran) };
+            let left = FixedParameter { value: fixed.value, trials: fixed.trials_left(name, trials) };
             (left.trials > 0).then(|| (name.clone(), left))
         };
         self.fixed.iter().filter_map(left).collect()

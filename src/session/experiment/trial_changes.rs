@@ -64,8 +64,9 @@ impl Experiment {
         }
     }
 
-    /// Fixes a parameter for the next `trials` trials that count; the other parameters are proposed for that value. A point
-    /// that was queued with a value of its own keeps it. Replaces an earlier fix of the same parameter.
+    /// Fixes a parameter for the next `trials` trials that count; the other parameters are proposed for that value, and may be
+    /// changed by the operator. A point that was queued with a value of its own keeps it and uses up none of them, and so does a
+    /// proposal in which the operator has changed this parameter. Replaces an earlier fix of the same parameter.
     /// Refused when a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be
     /// left to search.
     pub fn fix(&mut self, name: &str, value: f64, trials: u32) -> Result<(), RequestRefusal> {

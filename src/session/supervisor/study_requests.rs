@@ -112,10 +112,13 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         OperatorRequest::Fix { parameter, value, trials } => {
             experiment.fix(parameter, *value, *trials)?;
             let next = match trials {
-                1 => "next trial of the sampler that counts".to_owned(),
-                trials => format!("next {trials} trials of the sampler that count"),
+                1 => "next trial that counts".to_owned(),
+                trials => format!("next {trials} trials that count"),
             };
-            format!("{parameter} is {} for the {next}", six_digits(*value))
+            let value = six_digits(*value);
+            format!(
+                "{parameter} is {value} for the {next}; one with another {parameter}, queued or changed, uses up none"
+            )
         }
         OperatorRequest::Unfix { parameter } => {
             experiment.unfix(parameter)?;

@@ -16,7 +16,7 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
-use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, rows_of};
+use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, fixed_in_words, rows_of};
 use quadfrog::session::operator_request::counted;
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
 use serde_json::Value;
@@ -218,17 +218,8 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         let _ = writeln!(text, "  {name}: {}", in_words(value, between));
     }
     if ours.is_some() {
-        for (name, fixed) in study.attributes().get("fixed").and_then(Value::as_object).into_iter().flatten() {
-            let number = |key: &str| fixed.get(key).and_then(Value::as_f64);
-            let (Some(value), Some(trials), Some(from)) = (number("value"), number("trials"), number("from")) else {
-                continue;
-            };
-            let trials = counted(trials as u32, "counted trial");
-            let _ = writeln!(
-                text,
-                "  {name} was fixed at {} for {trials} of the sampler, from trial {from}",
-                six_digits(value)
-            );
+        for fixed in fixed_in_words(study) {
+            let _ = writeln!(text, "  {fixed}");
         }
         if let Some(samplers) = experiment::samplers_in_words(study) {
             let _ = writeln!(text, "  proposed: {samplers}");

@@ -292,7 +292,10 @@ fn field(
             });
             format!("write it as 50..120 or 50,120, without a space{allowed}; past trials stay")
         }
-        Purpose::Fix { .. } => "the others are still proposed by the sampler".to_owned(),
+        Purpose::Fix { parameter, .. } => {
+            let name = model.session.info.parameters.get(parameter).map_or("it", |info| &info.name);
+            format!("the others are still proposed; a trial that is void or has another {name} uses up none")
+        }
         Purpose::ConfirmBest => {
             let needed = match model.contenders.map(|contenders| model.session.trials.least_repeats(contenders)) {
                 Some(least) if least > 0 => format!("; to compare them takes {}", counted(least as u32, "repeat")),

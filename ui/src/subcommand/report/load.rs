@@ -10,7 +10,7 @@ use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::session::experiment::confirmation_in_words;
+use quadfrog::session::experiment::{confirmation_in_words, fixed_in_words};
 use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
@@ -99,6 +99,7 @@ fn reported(
         other_gains_of_best: best.map_or(String::new(), |best| best.other_gains(&configured)),
         rows,
         confirmation: ours.and_then(|_| confirmation_in_words(study)),
+        fixed: ours.map_or_else(Vec::new, |_| fixed_in_words(study)),
         model_best: study.model_best().map(|best| PredictedTrial {
             trial: best.trial,
             value: best.predicted,
