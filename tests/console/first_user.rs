@@ -171,6 +171,22 @@ fn names_of_numbers_stand_over_a_point_and_points_that_are_left_out_are_counted(
     }
 }
 
+/// Regression: the last line was cut in the middle of a key at 80 columns.
+#[test]
+fn the_step_of_a_dialog_over_a_stop_has_whole_keys() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["2", "Enter"]);
+    console.record(Record::Transition(Transition {
+        from: Mode::Review,
+        to: Mode::Damped,
+        cause: TransitionCause::Stop.to_string(),
+    }));
+    console.mode_of_ticks(Mode::Damped);
+    let last = |columns| console.screen(columns, 24).lines().last().unwrap_or_default().to_owned();
+    assert_eq!(last(80), " STOPPED: k acknowledges. Up Down other trials, Esc Enter q close.");
+    assert_eq!(last(100), " STOPPED: k acknowledges. Up Down other trials, PgUp PgDn scroll, Esc Enter q close.");
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

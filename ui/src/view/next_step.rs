@@ -366,7 +366,14 @@ pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
         }
         shown.retain(|key| columns(key) <= room);
     }
-    let lead = truncate(&next.lead, width.saturating_sub(1));
+    let lead = match &model.dialog {
+        Some(dialog) => {
+            let asks = !dialog.only_shows() && !matches!(dialog, Dialog::Override(_));
+            without_parts(&next.lead, width.saturating_sub(1), asks)
+        }
+        None => next.lead,
+    };
+    let lead = truncate(&lead, width.saturating_sub(1));
     let mut spans = vec![Span::raw(" "), span(theme, Role::Key, lead)];
     for (key, text) in shown {
         spans.extend([
@@ -376,4 +383,21 @@ pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
         ]);
     }
     Line::from(spans)
+}
+
+/// The step of a dialog within `width` columns: whole sentences after the first one go, of a question the last one, else those
+/// before the last one; then whole keys before the last one.
+fn without_parts(lead: &str, width: usize, asks: bool) -> String {
+    let fits = |text: &str| text.trim_end().chars().count() <= width;
+    let mut sentences: Vec<&str> = lead.split_inclusive(". ").collect();
+    while sentences.len() > 2 && !fits(&sentences.concat()) {
+        sentences.remove(sentences.len() - if asks { 1 } else { 2 });
+    }
+    let last = sentences.pop().unwrap_or_default();
+    let before = sentences.concat();
+    let mut keys: Vec<&str> = last.split(", ").collect();
+    while keys.len() > 1 && !asks && !fits(&format!("{before}{}", keys.join(", "))) {
+        keys.remove(keys.len() - 2);
+    }
+    (before + &keys.join(", ")).trim_end().to_owned()
 }
