@@ -187,6 +187,26 @@ fn the_step_of_a_dialog_over_a_stop_has_whole_keys() {
     assert_eq!(last(100), " STOPPED: k acknowledges. Up Down other trials, PgUp PgDn scroll, Esc Enter q close.");
 }
 
+/// Regression: whole verdicts were left out of the heading without a sign.
+#[test]
+fn counts_that_the_heading_leaves_out_have_a_sign() {
+    let mut console = Console::ready();
+    console.judged(68);
+    for number in 68..72 {
+        let row = TrialRecord { cause: SKIPPED.into(), ..trial(number, Some(Verdict::Void), None) };
+        console.record(Record::Trial(row));
+    }
+    console.press(&["2"]);
+    for columns in 80..160 {
+        let screen = console.screen(columns, 24);
+        let heading = line_with(&screen, "Trials ");
+        let shown = ["23 accept", "23 fall", "22 void", "4 not run"].map(|count| heading.contains(count));
+        let some = shown.contains(&true) && shown.contains(&false);
+        assert_eq!(heading.contains(", ..;"), some, "{heading}");
+    }
+    assert_shows(&console.screen(80, 24), &["by number (s), all (F), columns (x)"]);
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

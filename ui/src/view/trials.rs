@@ -66,8 +66,12 @@ fn summaries(model: &Model) -> [Vec<String>; 2] {
     let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
     let order = format!("by {sort}{turned} ({by}), {shown} ({only})");
     let keys = format!("{order}, columns ({columns})");
-    let fewer = (1..=found.len()).rev().map(|count| &found[..count]);
-    let with_counts = std::iter::once(&all[..]).chain(fewer).map(|counts| format!("{}; {keys}", counts.join(", ")));
+    // `..` stands for counts that are left out.
+    let fewer = (1..=found.len()).rev().map(|count| {
+        let rest = if count < found.len() { ", .." } else { "" };
+        format!("{}{rest}", found[..count].join(", "))
+    });
+    let with_counts = std::iter::once(all.join(", ")).chain(fewer).map(|counts| format!("{counts}; {keys}"));
     [with_counts.chain([keys.clone()]).collect(), vec![order, format!("{shown} ({only})")]]
 }
 
