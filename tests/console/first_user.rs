@@ -207,6 +207,35 @@ fn counts_that_the_heading_leaves_out_have_a_sign() {
     assert_shows(&console.screen(80, 24), &["by number (s), all (F), columns (x)"]);
 }
 
+/// Regression: the form of the bounds stayed open over a STOP, and Enter would have changed them.
+#[test]
+fn stop_closes_every_form_and_applies_nothing_of_it() {
+    let values = "STOP: damping. The form was closed, its values are not applied";
+    type Opening = (&'static [&'static str], &'static str);
+    let forms: [Opening; 5] = [
+        (&["4", "B"], values),
+        (&["4", "X"], values),
+        (&["K"], values),
+        (&["2", "Home", "f", "x"], "STOP: damping. The form was closed, no verdict was given"),
+        (&["2", "/", "3"], "STOP: damping"),
+    ];
+    for (keys, said) in forms {
+        let mut console = Console::ready();
+        console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+        console.record(Record::Trial(trial(3, Some(Verdict::Accept), None)));
+        console.press(keys);
+        assert!(console.model.dialog.is_some(), "{keys:?}: {}", console.said());
+        assert_eq!(console.press(&["F12"]), [Effect::Stop], "{keys:?}");
+        assert_eq!(console.said(), said, "{keys:?}");
+        assert!(console.model.dialog.is_none(), "{keys:?}");
+    }
+    // The field of the bounds names a form without a space, because Space is STOP there.
+    let mut console = Console::ready();
+    console.press(&["4", "B"]);
+    assert_shows(&console.screen(80, 24), &["write it as 50..120 or 50,120, without a space"]);
+    assert_eq!(console.press(&["1", "Space"]), [Effect::Stop]);
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

@@ -8,7 +8,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use crate::keymap::Key;
 use crate::legal::{may_acknowledge, may_request};
 use crate::message::Effect;
-use crate::model::dialog::Dialog;
+use crate::model::dialog::{Dialog, Purpose};
 use crate::model::{Model, Notice};
 
 /// A second Ctrl-C within this time quits.
@@ -94,7 +94,8 @@ pub(super) fn request(model: &mut Model, request: OperatorRequest) -> Vec<Effect
     }
 }
 
-/// Stops the robot. The dialog closes, so that the robot is visible; a half-written text stays.
+/// Stops the robot. The dialog closes, so that the robot is visible, and nothing of it is carried out; a half-written note, which
+/// changes nothing, stays.
 pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
     match model.observer() {
         Some(observer) if observer.ended => {
@@ -111,16 +112,32 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
         reply(model, LogLevel::Info, "this is a replay: there is no robot to stop");
         return Vec::new();
     }
-    let dropped = matches!(&model.dialog, Some(Dialog::Override(form)) if form.is_changed());
-    if !matches!(model.dialog, Some(Dialog::Field { .. })) {
+    let dropped = match &model.dialog {
+        Some(Dialog::Override(form)) if form.is_changed() => ". The form was closed, its values are not applied",
+        Some(Dialog::Field { purpose, .. }) => match purpose {
+            Purpose::HandValue(_)
+            | Purpose::Continue
+            | Purpose::Fix { .. }
+            | Purpose::Bounds { .. }
+            | Purpose::ConfirmBest => ". The form was closed, its values are not applied",
+            Purpose::VoidReason { .. } | Purpose::ChangeVerdict { .. } => ". The form was closed, no verdict was given",
+            Purpose::Note(_)
+            | Purpose::TrialNumber
+            | Purpose::LogSearch
+            | Purpose::Seek
+            | Purpose::Beside
+            | Purpose::Rejudge => "",
+        },
+        _ => "",
+    };
+    if !matches!(model.dialog, Some(Dialog::Field { purpose: Purpose::Note(_), .. })) {
         model.dialog = None;
     }
-    let text = match (model.session.info.observe, dropped) {
-        (true, _) => "STOP requested: damping is sent, a console in control may go on commanding",
-        (false, true) => "STOP: damping. The form was closed, its values are not applied",
-        (false, false) => "STOP: damping",
+    let text = match model.session.info.observe {
+        true => "STOP requested: damping is sent, a console in control may go on commanding".to_owned(),
+        false => format!("STOP: damping{dropped}"),
     };
-    say_stop(model, text);
+    say_stop(model, &text);
     vec![Effect::Stop]
 }
 
