@@ -236,6 +236,22 @@ fn stop_closes_every_form_and_applies_nothing_of_it() {
     assert_eq!(console.press(&["1", "Space"]), [Effect::Stop]);
 }
 
+/// Regression: the question about a re-run said that the point waits, though it was the proposal at once.
+#[test]
+fn the_question_about_a_rerun_says_when_it_runs() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.record(Record::Proposal(proposal(1, 0)));
+    console.stage(ExperimentStage::Proposed, 1);
+    console.press(&["2", "r"]);
+    assert_shows(&console.screen(80, 24), &["The parameters of trial #0 are the proposal now; the sampler's follows."]);
+    console.press(&["Esc"]);
+    let queued = |trial| QueuedPoint { trial, source: ProposalSource::Queued, ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: vec![queued(1), queued(2)], ..SearchStatus::default() }));
+    console.press(&["r"]);
+    assert_shows(&console.screen(80, 24), &["The parameters of trial #0 wait in the queue behind 2 points."]);
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

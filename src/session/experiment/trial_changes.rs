@@ -136,9 +136,10 @@ impl Experiment {
         Ok(self.propose()?)
     }
 
-    /// Queues the parameters of an earlier trial again, with its gains.
+    /// Queues the parameters of an earlier trial again, with its gains. Returns the number of the point if it is the open proposal
+    /// now, in place of the sampler's.
     /// Refused when there is no such trial, a value is outside its present bounds, or a trial is under way.
-    pub fn repeat(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+    pub fn repeat(&mut self, trial: u32) -> Result<Option<u32>, RequestRefusal> {
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
         let parameters = row.parameters.clone();
         let origin = Origin::rerun_of(trial, row.source, row.gains.clone());
@@ -161,9 +162,7 @@ impl Experiment {
         let differs = |name: &str, fixed: f64| parameters.get(name).is_some_and(|value| value != fixed);
         let not_fixed = fixed.into_iter().map(|(name, fixed)| (name, fixed.value));
         let not_fixed = not_fixed.filter(|(name, fixed)| differs(name, *fixed)).collect();
-        self.queue(&parameters, &Origin { gains, ..Origin::new(ProposalSource::Queued) })?;
-        let last = self.study.waiting().last().map(|trial| trial.number);
-        let proposed = self.proposal().map(|proposal| proposal.trial).filter(|trial| Some(*trial) == last);
+        let proposed = self.queue(&parameters, &Origin { gains, ..Origin::new(ProposalSource::Queued) })?;
         Ok(EnqueuedPoint { same, proposed, not_fixed })
     }
 
@@ -180,11 +179,14 @@ impl Experiment {
         Ok(())
     }
 
-    fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<(), RequestRefusal> {
+    /// Queues a point. Returns its number if it is the open proposal now.
+    fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<Option<u32>, RequestRefusal> {
         self.must_be_idle()?;
         self.queue_rerun()?;
         self.study.enqueue(parameters, &origin.attributes())?;
-        Ok(self.propose()?)
+        self.propose()?;
+        let last = self.study.waiting().last().map(|trial| trial.number);
+        Ok(self.proposal().map(|proposal| proposal.trial).filter(|trial| Some(*trial) == last))
     }
 
     /// Repeats the best points up to `repeats` times in all; 0 ends the confirmation. Makes the last verdict final. Returns

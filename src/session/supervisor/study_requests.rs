@@ -91,6 +91,11 @@ fn judged(judged: Result<(), RequestRefusal>, answer: String) -> JobOutput {
     JobOutput::Judged(judged.map(|()| answer).map_err(|refusal| refusal.to_string()), over)
 }
 
+/// Returns in words that a queued point is the proposal now; empty where others run before it.
+fn as_proposal(proposed: Option<u32>) -> String {
+    proposed.map_or(String::new(), |trial| format!(" as trial {trial}, the proposal now; the sampler's follows"))
+}
+
 fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<String, RequestRefusal> {
     Ok(match request {
         OperatorRequest::Skip { trial, revision } => {
@@ -144,8 +149,8 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             }
         }
         OperatorRequest::Rerun { trial: Some(trial) } => {
-            experiment.repeat(*trial)?;
-            format!("the parameters of trial {trial} are queued")
+            let proposed = experiment.repeat(*trial)?;
+            format!("the parameters of trial {trial} are queued{}", as_proposal(proposed))
         }
         OperatorRequest::Undo => {
             experiment.undo()?;
@@ -179,9 +184,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
                 None => "queued".to_owned(),
                 Some(same) => format!("queued once more: trial {same} is the same point and waits, too"),
             };
-            if let Some(trial) = queued.proposed {
-                text += &format!(" as trial {trial}, the proposal now; the sampler's follows");
-            }
+            text += &as_proposal(queued.proposed);
             for (name, fixed) in queued.not_fixed {
                 text += &format!("; its {name} is not the fixed {}", six_digits(fixed));
             }

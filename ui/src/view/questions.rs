@@ -1,8 +1,9 @@
 //! The texts of the questions: each says what follows, and Cancel is the default and comes first.
 
 use quadfrog::session::objective;
+use quadfrog::session::operator_request::counted;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, ProposedParameter, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{number, span};
@@ -133,9 +134,16 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
         }
         Question::Rerun { trial } => {
-            let text = format!(
-                "The parameters of trial #{trial} wait in the queue and run before the sampler's next proposal."
-            );
+            let confirms = |source: ProposalSource| source == ProposalSource::Confirm;
+            // A repeat that confirms the best runs after what the operator queues.
+            let before = model.session.queue().iter().filter(|point| !confirms(point.source)).count();
+            let follows = match model.session.open_proposal() {
+                None => "wait in the queue until the study has more trials".to_owned(),
+                Some(_) if before > 0 => format!("wait in the queue behind {}", counted(before as u32, "point")),
+                Some(proposal) if confirms(proposal.source) => "are the proposal now; the repeat follows".to_owned(),
+                Some(_) => "are the proposal now; the sampler's follows".to_owned(),
+            };
+            let text = format!("The parameters of trial #{trial} {follows}.");
             let answer = answers(&model.theme, "y", "queue");
             ("Queue it again?", vec![Line::from(text), Line::default(), answer])
         }
