@@ -163,8 +163,9 @@ impl fmt::Display for OperatorRequest {
                 write!(f, "queue {}", values.join(", "))
             }
             OperatorRequest::RemoveQueued { trial } => write!(f, "remove trial {trial} from the queue"),
-            OperatorRequest::MoveQueued { trial, earlier: true } => write!(f, "run queued trial {trial} earlier"),
-            OperatorRequest::MoveQueued { trial, earlier: false } => write!(f, "run queued trial {trial} later"),
+            // Not its number, which stays at its place: the moved point has another one afterwards.
+            OperatorRequest::MoveQueued { earlier: true, .. } => f.write_str("move earlier"),
+            OperatorRequest::MoveQueued { earlier: false, .. } => f.write_str("move later"),
             OperatorRequest::Continue(trials) => write!(f, "continue for {}", counted(*trials, "trial")),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),

@@ -1,6 +1,6 @@
 //! Search space, reasons of a proposal and statistics of repeated points, as they are shown.
 
-use super::{ParameterValues, ProposalSource};
+use super::{ParameterValues, ProposalSource, six_digits};
 
 /// The present search space and the progress of the study.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -32,6 +32,15 @@ pub struct QueuedPoint {
     pub parameters: ParameterValues,
     /// Gains that differ from the configured ones.
     pub gains: ParameterValues,
+}
+
+impl QueuedPoint {
+    /// Returns its values in words, `f0 1.3, Fx 90, Fz 240`; those that it lacks come from the sampler.
+    pub fn in_words(&self) -> String {
+        let values = self.parameters.iter().chain(self.gains.iter());
+        let values: Vec<_> = values.map(|(name, value)| format!("{name} {}", six_digits(*value))).collect();
+        if values.is_empty() { "parameters from the sampler".to_owned() } else { values.join(", ") }
+    }
 }
 
 /// One parameter as it is searched at present.

@@ -252,6 +252,19 @@ fn the_question_about_a_rerun_says_when_it_runs() {
     assert_shows(&console.screen(80, 24), &["The parameters of trial #0 wait in the queue behind 2 points."]);
 }
 
+/// Regression: the empty queue named the form of the override as the only place of the key.
+#[test]
+fn the_empty_queue_says_where_its_key_works() {
+    let mut console = Console::ready();
+    console.press(&["N"]);
+    assert_shows(
+        &console.screen(80, 24),
+        &["Q queues the values of the proposal; in the form of o those of the form."],
+    );
+    console.press(&["Esc"]);
+    assert!(matches!(console.requests(&["Q"])[..], [OperatorRequest::Enqueue(_)]));
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

@@ -55,6 +55,7 @@ fn queued_points_are_seen_moved_and_removed() {
     session.send("\x1b[B\x1b[B");
     session.send("\x1b[D");
     session.wait_for(&["#1    queued          f0 1.3", "#2    queued          f0 1.2"]);
+    session.wait_for(&["move earlier: f0 1.3, Fx 60, Fz 240 is number 2 of 3 in the queue now"]);
     session.send("\x1b[D");
     session.wait_for(&["#0    queued          f0 1.3", "#1    queued          f0 1.1"]);
     session.send("\x1b[D");

@@ -344,6 +344,30 @@ fn equal_repeats_give_no_confidence() {
     assert!(words.ends_with(&kept), "{kept}");
 }
 
+/// The answer to a moved point names its values and its place: its number is that of the place.
+#[test]
+fn a_moved_point_is_named_by_its_values_and_its_place() {
+    let mut experiment = experiment(20);
+    for f0 in [1.1, 1.2, 1.3] {
+        experiment.enqueue(&[("f0".into(), f0), ("Fx".into(), 60.0), ("Fz".into(), 250.0)]).unwrap();
+    }
+    let moved = experiment.move_queued(1, false).unwrap();
+    assert_eq!((moved.point.in_words(), moved.place, moved.of), ("f0 1.2, Fx 60, Fz 250".to_owned(), 3, 3));
+    let moved = experiment.move_queued(1, true).unwrap();
+    assert_eq!((moved.point.in_words(), moved.place), ("f0 1.3, Fx 60, Fz 250".to_owned(), 1));
+}
+
+/// Regression: the answer to a re-run from the table did not say that it is the proposal at once.
+#[test]
+fn a_repeated_point_is_the_proposal_unless_others_wait() {
+    let mut experiment = experiment(20);
+    let first = accept(&mut experiment).trial;
+    let proposed = experiment.repeat(first).unwrap();
+    assert_eq!(proposed, experiment.proposal().map(|proposal| proposal.trial));
+    assert!(proposed.is_some());
+    assert_eq!(experiment.repeat(first).unwrap(), None, "the first one runs before it");
+}
+
 /// The answer to a queued point says whether it is the proposal now, and which fixed values are not its own.
 #[test]
 fn a_queued_point_says_what_it_takes_the_place_of() {

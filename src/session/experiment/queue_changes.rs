@@ -7,6 +7,17 @@ use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{ParameterValues, QueuedPoint, REMOVED, Verdict};
 
+/// A queued point and its place in the queue, 1 for the next one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct QueuePlace {
+    /// The point.
+    pub point: QueuedPoint,
+    /// Its place.
+    pub place: u32,
+    /// Number of queued points.
+    pub of: u32,
+}
+
 impl Experiment {
     /// Removes a queued point: its trial becomes void, which the sampler does not see, and it never runs.
     /// Refused during a trial, for a trial that is not queued, and for a repeat that confirms the best.
@@ -24,9 +35,9 @@ impl Experiment {
     }
 
     /// Exchanges a queued point with the one before it, or after it. Trials run in the order of their numbers: the points
-    /// change places, the numbers stay.
+    /// change places, the numbers stay. Returns the new place of the point.
     /// Refused during a trial, for a trial that is not queued, at the ends of the queue, and for a repeat that confirms the best.
-    pub fn move_queued(&mut self, trial: u32, earlier: bool) -> Result<(), RequestRefusal> {
+    pub fn move_queued(&mut self, trial: u32, earlier: bool) -> Result<QueuePlace, RequestRefusal> {
         self.must_be_queued(trial)?;
         let waiting: Vec<u32> = self.study.waiting().map(|trial| trial.number).collect();
         let place = waiting.iter().position(|number| *number == trial);
@@ -39,7 +50,11 @@ impl Experiment {
         if !self.study.exchange_waiting(trial, other)? {
             return not_now(format!("trial {trial} or {other} has just begun elsewhere"));
         }
-        self.propose_after_change(proposed)
+        self.propose_after_change(proposed)?;
+        let queue = queued_points(&self.study);
+        let place = queue.iter().position(|point| point.trial == other).unwrap_or(0);
+        let point = queue.get(place).cloned().unwrap_or_default();
+        Ok(QueuePlace { point, place: place as u32 + 1, of: queue.len() as u32 })
     }
 
     /// Whether `trial` is the next one of the queue: the open proposal.

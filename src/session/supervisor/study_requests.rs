@@ -195,8 +195,8 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
             "it does not run".to_owned()
         }
         OperatorRequest::MoveQueued { trial, earlier } => {
-            experiment.move_queued(*trial, *earlier)?;
-            format!("it runs {} now", if *earlier { "earlier" } else { "later" })
+            let moved = experiment.move_queued(*trial, *earlier)?;
+            format!("{} is number {} of {} in the queue now", moved.point.in_words(), moved.place, moved.of)
         }
         OperatorRequest::Continue(trials) => {
             experiment.extend(*trials)?;
