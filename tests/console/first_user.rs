@@ -265,6 +265,16 @@ fn the_empty_queue_says_where_its_key_works() {
     assert!(matches!(console.requests(&["Q"])[..], [OperatorRequest::Enqueue(_)]));
 }
 
+/// Regression: "there is no trial yet" stood below a heading that named trial #0.
+#[test]
+fn before_the_first_jump_a_note_has_no_trial() {
+    let mut console = Console::ready();
+    console.press(&["m"]);
+    assert_eq!(console.said(), "m is not possible: trial #0 has not jumped yet");
+    console.press(&["Enter"]);
+    assert_eq!(console.said(), "trial #0 has not jumped yet");
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

@@ -57,7 +57,7 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Note => {
             may_request(model)?;
             must_not_jump(model)?;
-            require(model.trial_in_view().is_some(), "there is no trial yet")
+            require(model.trial_in_view().is_some(), &model.session.no_trial_yet())
         }
         A::Ghost => {
             // Of a trial of an earlier session it says where that is.

@@ -304,7 +304,8 @@ fn open_details(model: &mut Model) -> Vec<Effect> {
     } else if let Some(trial) = model.trial_in_view().map(|trial| trial.trial) {
         open(model, Dialog::Details { trial, scroll: 0 });
     } else {
-        reply(model, LogLevel::Info, "there is no trial yet");
+        let text = model.session.no_trial_yet();
+        reply(model, LogLevel::Info, text);
     }
     Vec::new()
 }
