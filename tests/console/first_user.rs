@@ -275,6 +275,30 @@ fn before_the_first_jump_a_note_has_no_trial() {
     assert_eq!(console.said(), "trial #0 has not jumped yet");
 }
 
+/// Regression: after a fall the last line left keys out without the one that shows them.
+#[test]
+fn after_a_fall_the_last_line_names_the_key_that_shows_the_others() {
+    let mut console = Console::review(Mode::Jump, Verdict::Fall);
+    let cause = TransitionCause::Fell(FallCause::BodyContact).to_string();
+    console.record(Record::Transition(Transition { from: Mode::Jump, to: Mode::Damped, cause }));
+    console.mode_of_ticks(Mode::Damped);
+    console.record(Record::Trial(trial(0, Some(Verdict::Fall), Some(Verdict::Fall))));
+    console.record(Record::Proposal(proposal(1, 0)));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    let mut tick = console.model.snapshot.tick;
+    tick.estimate.roll_pitch_yaw.x = 1.4;
+    tick.mode = Mode::Disarmed;
+    console.record(Record::Transition(Transition {
+        from: Mode::Damped,
+        to: Mode::Disarmed,
+        cause: "acknowledged".into(),
+    }));
+    let snapshot = Snapshot { tick, ..console.model.snapshot };
+    console.update(Msg::Snapshot(Box::new(snapshot)));
+    let last = console.screen(80, 24).lines().last().unwrap_or_default().to_owned();
+    assert!(last.contains("o override") && last.ends_with("? more"), "{last}");
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

@@ -234,7 +234,7 @@ fn the_step_before_arming_says_that_a_fallen_simulated_robot_is_turned_upright()
     console.model.snapshot.tick.estimate.roll_pitch_yaw.x = 3.0;
     let screen = console.screen(80, 24);
     let last = screen.lines().last().unwrap();
-    assert_shows(last, &["Press A to arm: the robot is turned upright and stands up.", "o override"]);
+    assert_shows(last, &["Press A to arm: the robot is turned upright and stands.", "o override"]);
     let narrow = console.screen(60, 20);
     assert_shows(&narrow, &["turned upright", "? help"]);
 }

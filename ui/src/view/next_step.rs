@@ -131,7 +131,7 @@ fn live(model: &Model) -> NextStep {
             let lead = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
                 0 if model.simulated_robot_lies() => {
-                    format!("Press {} to arm: the robot is turned upright and stands up.", key(Action::Arm))
+                    format!("Press {} to arm: the robot is turned upright and stands.", key(Action::Arm))
                 }
                 0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
                 1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
