@@ -299,6 +299,23 @@ fn after_a_fall_the_last_line_names_the_key_that_shows_the_others() {
     assert!(last.contains("o override") && last.ends_with("? more"), "{last}");
 }
 
+/// Regression: at 80x24 some charts named the middle of their axis and others did not.
+#[test]
+fn all_charts_of_a_screen_name_the_middle_of_their_axis_or_none() {
+    let mut console = Console::ready();
+    console.model.live.mode = ChartMode::Scroll;
+    console.ticks(0..4000, |time_ms| 0.1 * (time_ms as f64 / 300.0).sin());
+    for rows in 24..60 {
+        let screen = console.screen(80, rows);
+        // Roll has an axis around zero, a foot one around -0.2.
+        let rows_with =
+            |starts: [&str; 3]| screen.lines().filter(|line| starts.iter().any(|s| line.starts_with(s))).count();
+        let (labelled, symmetric) =
+            (rows_with(["    0 ", " -0.2 ", " -0.2│"]), rows_with(["roll", "FR foot", "RR foot"]));
+        assert!(labelled == 0 || labelled == symmetric, "{labelled} of {symmetric}:\n{screen}");
+    }
+}
+
 /// The dialog that fixes a parameter says which trials use it up.
 #[test]
 fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {

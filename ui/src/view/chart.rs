@@ -77,6 +77,8 @@ pub struct Chart<'a> {
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
     pub cursor_line: bool,
+    /// Whether the middle of the vertical axis is named: the same for all charts of a screen.
+    pub middle_tick: bool,
     pub theme: Theme,
 }
 
@@ -135,8 +137,8 @@ impl Chart<'_> {
         if plot.height > 1 {
             tick(plot.height - 1, low);
         }
-        // An even number of rows has no middle one.
-        if plot.height % 2 == 1 && plot.height > 2 {
+        // Of an even number of rows the lower one, where the line at zero is.
+        if self.middle_tick && plot.height > 2 {
             tick(plot.height / 2, (low + high) / 2.0);
         }
     }

@@ -210,6 +210,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
         .map(|cell| (cell, phases(&source.axis, &source.history, cell.width)))
         .collect();
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
+    let middle_tick = rows.iter().all(|row| row.height > CHART_ROWS);
     let drawn: Vec<SeriesStyle> = series.iter().take(across * down).map(|series| style(*series, model)).collect();
     let own: Vec<usize> =
         drawn.iter().map(|style| style.range_of(&source.history, &source.axis, source.ghost)).collect();
@@ -226,6 +227,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
             ghost: source.ghost,
             cursor_ns: source.cursor_ns,
             cursor_line: model.live.cursor_line,
+            middle_tick,
             theme,
         };
         chart.draw(frame.buffer_mut(), columns(rows[index / across])[index % across]);
