@@ -44,10 +44,14 @@ impl Judgement {
         Some(if difference.abs() <= RECORDED_PRECISION { 0.0 } else { difference })
     }
 
-    /// Whether verdict, reason or value differ from those of `old`.
+    /// Whether verdict, reason or value differ from those of `old`. Words of the operator may stand before the reason of `old`.
     pub fn differs(&self, old: &Judgement) -> bool {
         let same_value = self.difference(old).map_or(self.value == old.value, |difference| difference == 0.0);
-        self.verdict != old.verdict || self.cause != old.cause || !same_value
+        let same_cause = old
+            .cause
+            .strip_suffix(&self.cause)
+            .is_some_and(|words| words.is_empty() || words.ends_with(": ") || words.ends_with("; "));
+        self.verdict != old.verdict || !same_cause || !same_value
     }
 
     /// Returns the judgement of a trial of several rollouts from theirs.

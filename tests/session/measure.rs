@@ -6,6 +6,7 @@ use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{CONTROL_PERIOD_S, ticks_in};
 use quadfrog::session::evaluation::evaluate;
 use quadfrog::session::objective::{SHORTEST_BOUNCE_S, measure, suggest, suggest_measured, value};
+use quadfrog::session::rejudge::Judgement;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Phase, Tick, TrialEnd, TrialSpec};
@@ -155,4 +156,21 @@ fn an_older_record_without_the_new_values_still_reads() {
     let old: MeasuredJump = serde_json::from_str(text).unwrap();
     assert_eq!((old.dx_m, old.flights, old.measured_value, old.jumps.len()), (0.4, 0, None, 0));
     assert!((value(&rule(BounceRule::Zero), &old) - 0.4).abs() < 1e-12);
+}
+
+/// Regression: a trial that the operator had re-run changed by being judged again, because his words stand before the reason.
+#[test]
+fn words_of_the_operator_before_the_reason_are_no_other_judgement() {
+    let judged =
+        |cause: &str| Judgement { value: Some(0.4), measured: None, verdict: Some(Verdict::Fall), cause: cause.into() };
+    let new = judged("pitch 1.20 rad");
+    for old in [
+        "pitch 1.20 rad",
+        "by the operator: it slipped; pitch 1.20 rad",
+        "re-run by the operator; looked like fall: pitch 1.20 rad",
+    ] {
+        assert!(!new.differs(&judged(old)), "{old}");
+    }
+    assert!(new.differs(&judged("roll 1.20 rad")));
+    assert!(new.differs(&judged("looked at by pitch 1.20 rad")));
 }

@@ -21,11 +21,15 @@ pub struct RejudgedTable {
 }
 
 impl RejudgedTable {
-    /// The number of trials that change, and of those judged while they are.
+    /// The number of suggested verdicts, values and reasons that change, and of those judged while they are.
     pub fn summary(&self) -> String {
         let changed = self.trials.values().filter(|trial| trial.new.differs(&trial.old)).count();
         let (judged, count) = (self.trials.len(), self.count);
-        if self.done { format!("{changed} of {judged} change") } else { format!("{judged} of {count} judged again") }
+        if self.done {
+            format!("{changed} of {judged} suggestions change")
+        } else {
+            format!("{judged} of {count} judged again")
+        }
     }
 
     /// The value that the sampler would receive by the new configuration: 0 for a fall; none without a verdict.
