@@ -24,7 +24,7 @@ use std::path::PathBuf;
 #[expect(missing_docs, reason = "the messages name variants and fields")]
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    #[error("{}: no such configuration folder; give a folder that holds control.toml, safety.toml, ... or leave --config away", path.display())]
+    #[error("{}: no such configuration folder; give a folder that holds control.toml, safety.toml, ... or none, for the defaults", path.display())]
     NoFolder { path: PathBuf },
     #[error("{}: not a configuration file; the files are {known}", path.display())]
     UnknownFile { path: PathBuf, known: String },

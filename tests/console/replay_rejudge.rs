@@ -84,7 +84,7 @@ fn the_new_judgements_stand_beside_the_recorded_ones_and_the_file_stays() {
     assert!(changed >= 2, "{changed} change");
     for size in [(80, 24), (120, 40)] {
         let mut session = trials(size, &["--rejudge", "strict"]);
-        session.wait_for(&[&format!("{changed} of 6 change")]);
+        session.wait_for(&[&format!("{changed} of 6 suggestions change")]);
         session.wait_for(&["new m"]);
         assert_rows(&session, &rows);
         // Without them: the table as before.
@@ -102,7 +102,7 @@ fn a_key_takes_the_folder_of_a_configuration() {
     session.send("J");
     session.wait_for(&["Judge all trials again", "empty: the defaults"]);
     session.send("rate\r");
-    session.wait_for(&["new m/s", " of 6 change"]);
+    session.wait_for(&["new m/s", " of 6 suggestions change"]);
     assert_rows(&session, &expected("rate"));
     // The details name cause and measured values of both.
     session.send("\x1b[H\r");
@@ -115,9 +115,12 @@ fn a_key_takes_the_folder_of_a_configuration() {
     session.wait_until("removed", || !session.screen().contains("new m/s"));
     // The defaults are those of the recording: nothing changes.
     session.send("J\r");
-    session.wait_for(&["the defaults: 0 of 6 change"]);
+    session.wait_for(&["the defaults: 0 of 6 suggestions change"]);
     session.send("JJmissing\r");
-    session.wait_for(&["not judged again: ", "missing"]);
+    // The field opens again with the folder that was refused.
+    session.wait_for(&["Judge all trials again", "not judged again: missing: no such configuration folder"]);
+    session.send(&format!("{}rate\r", "\x7f".repeat("missing".len())));
+    session.wait_for(&["new m/s", " of 6 suggestions change"]);
     session.send("q");
     assert!(session.wait().success());
 }

@@ -132,8 +132,13 @@ pub enum RejudgeNews {
     Trial(Box<RejudgedTrial>),
     /// All trials are judged.
     Done,
-    /// The reason for which they cannot be judged.
-    Failed(String),
+    /// They cannot be judged.
+    Failed {
+        /// The folder of the configuration, as it was typed; empty for the defaults.
+        folder: String,
+        /// Reason.
+        reason: String,
+    },
 }
 
 /// A command to the replay.

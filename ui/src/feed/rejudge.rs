@@ -13,13 +13,16 @@ use crate::message::RejudgeNews;
 pub fn rejudge(files: Vec<PathBuf>, folder: Option<PathBuf>) -> Receiver<RejudgeNews> {
     let (sender, news) = channel();
     let in_thread = sender.clone();
+    let named = folder.as_ref().map_or_else(String::new, |folder| folder.display().to_string());
+    let failed = move |reason: String| RejudgeNews::Failed { folder: named, reason };
+    let failed_in_thread = failed.clone();
     let judge = move || {
         if let Err(reason) = judge(&files, folder, &in_thread) {
-            let _ = in_thread.send(RejudgeNews::Failed(reason));
+            let _ = in_thread.send(failed_in_thread(reason));
         }
     };
     if let Err(error) = std::thread::Builder::new().name("rejudge".into()).spawn(judge) {
-        let _ = sender.send(RejudgeNews::Failed(error.to_string()));
+        let _ = sender.send(failed(error.to_string()));
     }
     news
 }

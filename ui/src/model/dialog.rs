@@ -189,6 +189,11 @@ impl Dialog {
         Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces, problem: None }
     }
 
+    /// A line with a text that was refused.
+    pub fn refused_field(purpose: Purpose, text: &str, problem: String) -> Dialog {
+        Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces: false, problem: Some(problem) }
+    }
+
     /// Whether a space is text here: not where a number is typed.
     pub fn takes_spaces(&self) -> bool {
         match self {

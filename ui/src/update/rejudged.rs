@@ -38,7 +38,12 @@ pub(super) fn apply(model: &mut Model, news: RejudgeNews) {
             let text = format!("judged again by {}: {}", table.configuration, table.summary());
             reply(model, LogLevel::Info, text);
         }
-        (RejudgeNews::Failed(reason), _) => {
+        // The folder is asked again, with what was typed, unless something else was opened meanwhile.
+        (RejudgeNews::Failed { folder, reason }, None) if model.dialog.is_none() => {
+            model.dialog =
+                Some(Dialog::refused_field(Purpose::Rejudge, &folder, format!("not judged again: {reason}")));
+        }
+        (RejudgeNews::Failed { reason, .. }, _) => {
             model.rejudged = None;
             say(model, LogLevel::Error, format!("not judged again: {reason}"));
         }
