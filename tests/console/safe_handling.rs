@@ -95,7 +95,19 @@ fn a_leftover_of_a_killed_session_is_damaged_also_beside_the_session_that_contin
     assert_eq!(output.status.code(), Some(0));
     let output = program.run(&["replay", "--check", left.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
-    quit(&mut session);
+    let (_, screen) = quit(&mut session);
+    assert_shows(&screen, &["repair an incomplete recording"]);
+
+    // Regression: the advice to recover it came again after it was recovered, and the report used it in place of the whole file.
+    program.text(&["recover", left.to_str().unwrap()]);
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["--resume", study.to_str().unwrap()]);
+    let mut session = Session::run(&program.path("."), SIZE, command);
+    session.wait_for(&["Press A to arm"]);
+    let (_, screen) = quit(&mut session);
+    assert!(screen.contains("play the recording") && !screen.contains("repair"), "{screen}");
+    let report = program.text(&["report", study.to_str().unwrap()]);
+    assert!(left.exists() && !report.contains("mcap.part"), "{report}");
 }
 
 /// Regression: the console ended with status 0 and named the other file as its recording.

@@ -290,11 +290,10 @@ fn address(text: &str) -> Result<SocketAddr, Failure> {
     found.next().ok_or_else(|| refuse("no such host".to_owned()))
 }
 
-/// Returns the recordings that earlier sessions of this study did not finish.
+/// Returns the recordings that earlier sessions of this study did not finish, without those that were recovered.
 fn incomplete_recordings(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    paths.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
+    let files = recordings_in(folder).into_iter();
+    files.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
 /// Returns the settings of `console.toml`.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::study::Storage;
+use quadfrog::recording::session_files::recordings_in;
 use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
@@ -121,19 +122,10 @@ fn description(kept: Option<&Path>, name: &str) -> Option<RobotDescription> {
 
 /// Returns the recordings in a study's folder in the order of their sessions, then those that its trials name elsewhere.
 fn recordings(opened: &Opened, folder: Option<&Path>) -> Vec<PathBuf> {
-    let number = |path: &Path| -> Option<u32> {
-        let name = path.file_name()?.to_str()?;
-        let stem = name.strip_suffix(".part").unwrap_or(name).strip_suffix(".mcap")?.strip_prefix("session")?;
-        if stem.is_empty() { Some(1) } else { stem.strip_prefix('-')?.parse().ok() }
-    };
-    let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten();
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut own: Vec<(u32, PathBuf)> = paths.filter_map(|path| Some((number(&path)?, path))).collect();
-    own.sort();
     let named = opened.study.trials().iter().filter_map(|trial| trial.user_attributes.get("recording")?.as_str());
     // A name without a folder is that of a file beside the journal.
     let elsewhere: BTreeSet<PathBuf> = named.filter(|name| name.contains('/')).map(PathBuf::from).collect();
-    let mut all: Vec<PathBuf> = own.into_iter().map(|(_, path)| path).collect();
+    let mut all: Vec<PathBuf> = folder.map_or_else(Vec::new, recordings_in);
     for path in elsewhere {
         let found = [path.clone(), path.with_extension("mcap.part")].into_iter().find(|path| path.is_file());
         all.extend(found.filter(|path| !all.contains(path)));
