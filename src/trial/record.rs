@@ -58,6 +58,11 @@ impl TrialRecord {
         self.verdict == Some(Verdict::Void) && refused
     }
 
+    /// Whether its value was measured by hand.
+    pub fn value_is_by_hand(&self) -> bool {
+        self.hand_value.is_some() && self.hand_value == self.value
+    }
+
     /// Returns the origin of its parameters in words, with the trial that it repeats: `re-run of #3`.
     pub fn origin(&self) -> String {
         self.source.with_parent(self.parent)

@@ -258,7 +258,12 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
                 ProposalSource::Sampler => String::new(),
                 other => format!(" ({})", other.name()),
             };
-            format!("trial {}{source}: {}{value}", trial.trial, trial.verdict_name().unwrap_or(verdict.name()))
+            // A study that is continued begins with the rows of the sessions before.
+            let ran_before = !trial.was_not_run() && !model.session.trials.ran.contains_key(&trial.trial);
+            let of = if ran_before { " of an earlier session" } else { "" };
+            let by_hand = if trial.value_is_by_hand() { " by hand" } else { "" };
+            let verdict = trial.verdict_name().unwrap_or(verdict.name());
+            format!("trial {}{of}{source}: {verdict}{value}{by_hand}", trial.trial)
         }
         (None, Some(verdict)) if !known(|t| t.suggested) => {
             let cause = if trial.cause.is_empty() { String::new() } else { format!(" ({})", trial.cause) };

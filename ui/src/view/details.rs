@@ -83,7 +83,9 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     }
     if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
         let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
-            (Some(trial), Some(distance)) => format!("; nearest fall #{trial}, {distance:.3} of a range away"),
+            (Some(trial), Some(distance)) => {
+                format!("; nearest fall #{trial}, {distance:.3} away (1: the whole range of a parameter)")
+            }
             _ => String::new(),
         };
         row("risk before", format!("{} of the {} nearest fell{nearest}", risk.falls, risk.neighbours));

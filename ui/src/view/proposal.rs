@@ -159,7 +159,7 @@ fn risk(theme: &Theme, risk: Option<FallRisk>) -> Line<'static> {
     let role = if risk.falls * 2 >= risk.neighbours { Role::Warning } else { Role::Quiet };
     let mut text = format!(" {} of the {} nearest fell", risk.falls, risk.neighbours);
     if let (Some(distance), Some(trial)) = (risk.nearest_fall, risk.nearest_fall_trial) {
-        text.push_str(&format!("; nearest fall #{trial}, {distance:.2} of a range away"));
+        text.push_str(&format!("; nearest fall #{trial}, {distance:.2} away (1: a whole range)"));
     }
     Line::from(span(theme, role, text))
 }

@@ -272,7 +272,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             (format!("{value:>7}"), Role::Text)
         }
         Column::Value => {
-            let hand = if trial.hand_value.is_some() && trial.hand_value == trial.value { "h" } else { " " };
+            let hand = if trial.value_is_by_hand() { "h" } else { " " };
             (format!("{:>8}{hand}", trial.value.map_or("-".to_owned(), number)), Role::Text)
         }
         Column::Verdict => {
