@@ -568,6 +568,37 @@ fn a_trial_that_was_seen_running_for_too_long_is_void_and_comes_again() {
     assert_eq!((proposal.source, proposal.parent), (ProposalSource::Rerun, Some(spec.trial)));
 }
 
+/// Regression: the header said "0 of 20 counted" beside twenty trials of two workers, and the proposal stayed until its approval was
+/// refused.
+#[test]
+fn trials_of_other_workers_are_counted_beside_an_open_proposal_and_end_it_with_the_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut ours = Experiment::open(plan(3), study_in(folder.path())).unwrap();
+    let counted = |experiment: &mut Experiment| {
+        let records = experiment.take_records();
+        let of = |record| if let Record::Search(search) = record { Some(search.counted) } else { None };
+        records.into_iter().filter_map(of).next_back()
+    };
+    assert_eq!(counted(&mut ours), Some(0));
+    let seen = ours.proposal().unwrap();
+    let mut theirs = joined(folder.path(), 3, PATIENT);
+    accept(&mut theirs);
+    accept(&mut theirs);
+    theirs.close().unwrap();
+    ours.refresh().unwrap();
+    assert_eq!(counted(&mut ours), Some(2));
+    ours.refresh().unwrap();
+    assert_eq!(counted(&mut ours), None, "published once");
+    let kept = ours.proposal().unwrap();
+    assert_eq!((kept.trial, kept.revision), (seen.trial, seen.revision), "what the operator reads stays");
+
+    let mut last = joined(folder.path(), 3, PATIENT);
+    accept(&mut last);
+    last.close().unwrap();
+    ours.refresh().unwrap();
+    assert_eq!((counted(&mut ours), ours.stage()), (Some(3), ExperimentStage::Finished));
+}
+
 /// Regression: the verdict's teller did not look whether another worker had paid the debt already.
 #[test]
 fn a_rerun_that_another_worker_has_queued_comes_once() {

@@ -291,11 +291,16 @@ impl Experiment {
         match &self.state {
             ExperimentState::Proposed(open) => {
                 let next = self.study.waiting().next().map(|trial| trial.number);
-                if next != open.waits_as() && !open.is_changed() {
+                let full = |study: &Study| self.queue.occupied(study.trials()) >= self.plan.budget;
+                // The journal does not have the last verdict yet.
+                if !open.approved().is_beyond_budget() && full(&self.study) && full(&self.study_with_verdict()?) {
+                    self.log("other workers have run the trials that were left".to_owned());
+                    self.propose()?;
+                } else if next != open.waits_as() && !open.is_changed() {
                     self.log("another program has changed the queue: a new proposal follows".to_owned());
                     self.propose()?;
                 }
-                self.publish_queue()?;
+                self.publish_changes()?;
             }
             _ => {
                 let room = self.queue.occupied(self.study.trials()) < self.plan.budget;

@@ -47,6 +47,13 @@ pub struct ApprovedProposal {
     pub only_with_verdict: bool,
 }
 
+impl ApprovedProposal {
+    /// Whether it runs also when the budget is used up: a repeat of the best, also one whose values were changed.
+    pub fn is_beyond_budget(&self) -> bool {
+        [self.proposal.source, self.origin.source].contains(&ProposalSource::Confirm)
+    }
+}
+
 impl OpenProposal {
     /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with values
     /// of its own. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the

@@ -159,6 +159,7 @@ impl Experiment {
     /// Makes the approved proposal a running trial of the study; with a cause in `skipped` one that has ended void, in the same
     /// commit. Returns its number.
     pub fn begin(&mut self, approved: ApprovedProposal, skipped: Option<String>) -> Result<u32, RequestRefusal> {
+        let beyond_budget = approved.is_beyond_budget();
         let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_verdict } = approved;
         let mut queued = self.report_verdict()?;
         if only_with_verdict {
@@ -176,7 +177,6 @@ impl Experiment {
         let seed = origin.seed().unwrap_or_else(|| self.trial_seed(draft.number));
         let sampler = (!draft.enqueued).then_some(self.study.options().sampler.kind);
         let began = BeganAttributes::new(&proposal, seed, origin.repeats.clone(), &self.plan, fixed, sampler);
-        let beyond_budget = [proposal.source, origin.source].contains(&ProposalSource::Confirm);
         let (queue, budget) = (&self.queue, self.plan.budget);
         let room = |trials: &[Trial]| beyond_budget || queue.occupied(trials) < budget;
         let verdict = skipped.is_some().then_some(Verdict::Void);
