@@ -126,7 +126,7 @@ fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
     }
     let labels: Vec<&str> = trials.iter().map(|trial| trial.label.as_str()).collect();
     let of = if group.len() > 1 { format!(" of {}, the best study with ticks", study.label()) } else { String::new() };
-    section.paragraph(format!("Drawn trials{of}: {}.", labels.join("; ")));
+    section.paragraph(format!("Trials shown{of}: {}.", labels.join("; ")));
     section.paragraph(ticks(study, &trials));
     section.blocks.extend(figures.force(study, &trials).map(Block::Figure));
     section.blocks.extend(tables::takeoff(study, &trials).map(Block::Table));

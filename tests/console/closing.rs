@@ -123,3 +123,12 @@ fn a_key_without_an_effect_leaves_the_answer() {
     console.press(&["Esc"]);
     assert_eq!(console.said(), "accept trial 0");
 }
+
+/// Regression: the key that opens the help was said to do nothing in it.
+#[test]
+fn the_key_of_the_help_closes_it_again() {
+    let mut console = Console::ready();
+    console.press(&["?", "?"]);
+    assert!(console.model.dialog.is_none());
+    assert_eq!(console.said(), "");
+}

@@ -218,7 +218,10 @@ fn a_value_by_hand_far_from_the_measured_one_is_asked_about() {
         console.enter(typed);
         assert_eq!(console.requests(&["Enter"]), [], "{typed}");
         let text = format!("Trial #0: {value} m by hand, but the robot measured 0.420 m.");
-        assert_shows(&console.screen(80, 24), &["Is this value right?", &text, "Press y to use the value"]);
+        let screen = console.screen(80, 24);
+        assert_shows(&screen, &["Is this value right?", &text, "Press y to use the value", "goes back to the field."]);
+        // Regression: "any other key cancels" was said of a key that leads back to the field.
+        assert!(screen.contains(" Back to the field ") && !screen.contains("ancel"), "{screen}");
         assert_eq!(console.requests(&["n"]), []);
         assert_shows(&console.screen(80, 24), &["Trial #0, measured by hand", &value.to_string()]);
         console.enter(typed);

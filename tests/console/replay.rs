@@ -162,6 +162,8 @@ fn places_are_typed_as_times_seconds_and_trials() {
     let mut session = paused(&recording());
     go(&mut session, "0:05", "00:05.000");
     go(&mut session, "7.25", "00:07.250");
+    // Regression: the help names the form "75.5 s", which was refused.
+    go(&mut session, "7.5s", "00:07.500");
     go(&mut session, "#3", &shown(span(3).begin_ns));
     for (place, problem) in [
         ("99:00", "is after the end"),
@@ -199,7 +201,7 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
     }
     // After the last one it stays there and says so.
     session.send("}");
-    session.wait_for(&["no further fall or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.wait_for(&["no further trial that fell, or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
     session.send(")");
     session.wait_for(&[&shown(timeline().duration_ns())]);
     session.send("]");

@@ -2,10 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 use crate::program::{Program, assert_shows};
 use crate::pty::Session;
 use portable_pty::CommandBuilder;
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::{Record, Stamped, Transition};
+use quadfrog::telemetry::Mode;
 use xml::attribute::OwnedAttribute;
 use xml::reader::{EventReader, XmlEvent};
 
@@ -73,6 +77,42 @@ fn a_picture_for_paper_has_a_light_background_and_the_end_of_a_trial() {
     let (drawn, background) = cells(&std::fs::read_to_string(program.path("a.svg")).unwrap(), 40);
     assert_eq!(background, "#ffffff");
     assert!(drawn[38].contains("trial #12, suggested verdict: accept"), "{drawn:?}");
+}
+
+/// Regression: the recording had the checklist of the start of the session, not the one with which the robot was armed.
+#[test]
+fn a_recording_has_the_time_of_the_first_arming_checks() {
+    let program = Program::new();
+    let folder = program.path("recordings");
+    std::fs::create_dir(&folder).unwrap();
+    let mut session = Session::start(&folder, (80, 24), &[]);
+    session.wait_for(&["Press A to arm"]);
+    // Some seconds later than the first list.
+    std::thread::sleep(Duration::from_secs(2));
+    session.send("A5");
+    let armed =
+        |text: &str| text.lines().find(|line| line.contains(" at ") && line.contains("passed (P)")).map(time_of);
+    session.wait_until("armed", || session.screen().starts_with(" READY") && armed(&session.screen()).is_some());
+    let live = armed(&session.screen());
+    std::thread::sleep(Duration::from_secs(1));
+    session.quit();
+    let file = program.study("recordings").join("session.mcap");
+    let played = Player::open(&file).unwrap();
+    let ready = played.filter_map(|played| match played {
+        Played::Record(Stamped { time_ns, record: Record::Transition(Transition { to: Mode::Ready, .. }) }) => {
+            Some(time_ns)
+        }
+        _ => None,
+    });
+    let ready_s = ready.min().unwrap() as f64 / 1e9;
+    let time = format!("--time={}", ready_s + 0.5);
+    let svg = program.text(&["screenshot", file.to_str().unwrap(), &time, "--keys", "5", "--size", "80x24"]);
+    assert_eq!(armed(&cells(&svg, 24).0.join("\n")), live);
+}
+
+/// The time of day behind "at".
+fn time_of(line: &str) -> String {
+    line.split(" at ").nth(1).unwrap_or_default().chars().take("12:34:56".len()).collect()
 }
 
 #[test]

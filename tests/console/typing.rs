@@ -221,3 +221,15 @@ fn typing_replaces_a_number_that_was_refused() {
     let bounds = console.requests(&["Enter"]);
     assert_eq!(bounds, [OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.0 }]);
 }
+
+/// Regression: after a character that was not taken the last line promised that Enter confirms.
+#[test]
+fn enter_is_not_said_to_confirm_before_a_refused_character_is_acknowledged() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["=", "z"]);
+    console.enter("0.44");
+    let last = |console: &mut Console| console.screen(80, 24).lines().last().unwrap_or_default().to_owned();
+    assert_shows(&last(&mut console), &["Enter asks again, Esc cancels. Space is STOP."]);
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_shows(&last(&mut console), &["Enter confirms, Esc cancels. Space is STOP."]);
+}

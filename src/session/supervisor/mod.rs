@@ -374,7 +374,7 @@ impl Supervisor {
                 self.mode_changes += 1;
                 self.releasing = false;
                 self.checklist.mode_changed(from, to, &cause);
-                self.published_checklist.clear();
+                self.record_checklist();
                 if !(self.sitting_for_review && to == Mode::SitDown) {
                     self.unattended.mode_changed(to, cause);
                 }

@@ -59,4 +59,13 @@ impl Supervisor {
         self.checklist_ns = time_ns;
         self.published_checklist = list;
     }
+
+    /// Records the checklist with which the robot leaves DISARMED, as it was shown last.
+    pub(super) fn record_checklist(&mut self) {
+        let list = std::mem::take(&mut self.published_checklist);
+        if !list.is_empty() {
+            let stamped = Stamped { time_ns: self.checklist_ns, record: Record::ArmingChecks(list) };
+            self.recorder_gone |= !self.sinks.send(stamped);
+        }
+    }
 }

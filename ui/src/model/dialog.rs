@@ -152,6 +152,11 @@ pub enum Purpose {
     Rejudge,
 }
 
+/// End of the message about a character that is not part of a number.
+pub const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
+/// End of the message about a character that is not part of a place in a recording.
+pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, or best is typed";
+
 impl Purpose {
     /// The characters that its text may hold; none for any.
     pub fn characters(self) -> Option<&'static str> {
@@ -192,6 +197,12 @@ impl Dialog {
     /// A line with a text that was refused.
     pub fn refused_field(purpose: Purpose, text: &str, problem: String) -> Dialog {
         Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces: false, problem: Some(problem) }
+    }
+
+    /// Whether the field waits for an acknowledgement of a character that it has not taken: the next Enter confirms nothing.
+    pub fn has_refused_character(&self) -> bool {
+        let Dialog::Field { problem: Some(problem), .. } = self else { return false };
+        [NOT_OF_A_NUMBER, NOT_OF_A_PLACE].iter().any(|end| problem.ends_with(end))
     }
 
     /// Whether a space is text here: not where a number is typed.

@@ -318,16 +318,19 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Confirm(Question::Undo { trial }) => {
             format!("Press y to take the verdict of trial #{trial} back. Any other key cancels.")
         }
-        Dialog::Confirm(Question::HandValue { .. }) => "Press y to use the value. Any other key cancels.".to_owned(),
+        Dialog::Confirm(Question::HandValue { .. }) => {
+            "Press y to use the value. Any other key goes back to the field.".to_owned()
+        }
         Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
         Dialog::Field { purpose, .. } if purpose.is_remark() && model.space_bar_must_stop() => {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
-        Dialog::Field { .. } if model.can_stop() && !model.space_bar_is_text() => {
-            "Enter confirms, Esc cancels. Space is STOP.".to_owned()
+        Dialog::Field { .. } => {
+            let enter = if dialog.has_refused_character() { "Enter asks again" } else { "Enter confirms" };
+            let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
+            format!("{enter}, Esc cancels.{space}")
         }
-        Dialog::Field { .. } => "Enter confirms, Esc cancels.".to_owned(),
         Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
         Dialog::Choose { .. } => format!("Up Down choose, x switches it on or off, {close}"),
         Dialog::Queue { .. } if model.session.queue().is_empty() => close,

@@ -14,8 +14,13 @@ use crate::theme::{Role, Theme};
 
 /// The two answers; Cancel is the default and comes first.
 fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
+    answers_or("Cancel", theme, key, text)
+}
+
+/// The two answers with another word for the default.
+fn answers_or(default: &str, theme: &Theme, key: &str, text: &str) -> Line<'static> {
     Line::from(vec![
-        span(theme, Role::Selected, " Cancel "),
+        span(theme, Role::Selected, format!(" {default} ")),
         span(theme, Role::Quiet, " Enter, or any other key     "),
         span(theme, Role::Key, key.to_owned()),
         span(theme, Role::Text, format!(" {text}")),
@@ -214,7 +219,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
                 Line::from(format!("Trial #{trial}: {} {unit} by hand, but {measured}.", six_digits(*value))),
                 Line::from("An accepted trial reports the value by hand to the optimizer."),
                 Line::default(),
-                answers(&model.theme, "y", "use it"),
+                answers_or("Back to the field", &model.theme, "y", "use it"),
             ];
             ("Is this value right?", lines)
         }

@@ -58,6 +58,10 @@ pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut sel
 }
 
 pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect> {
+    // The key that has opened it.
+    if model.keymap.action(key) == Some(Action::Help) {
+        return Vec::new();
+    }
     let scroll = scrolled(model, key, scroll, "Up Down PgUp PgDn Home");
     model.dialog = Some(Dialog::Help { scroll });
     Vec::new()

@@ -5,12 +5,12 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use tui_input::Input;
 
-use super::text_field::{NOT_OF_A_NUMBER, edit};
+use super::text_field::edit;
 use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, OverrideForm, OverrideRow};
+use crate::model::dialog::{Dialog, NOT_OF_A_NUMBER, OverrideForm, OverrideRow};
 use crate::update::request::{cancelled, does_nothing, reply, request};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {

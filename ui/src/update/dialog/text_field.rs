@@ -9,7 +9,7 @@ use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Purpose, Question};
+use crate::model::dialog::{Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question};
 use crate::update::beside::chosen;
 use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
@@ -18,10 +18,6 @@ use crate::update::request::{cancelled, request};
 /// than the estimator drifts in a jump, less than a lost or a shifted decimal point.
 const DOUBTED_SHARE: f64 = 0.5;
 const DOUBTED_DISTANCE: f64 = 0.2;
-
-/// End of the message about a character that is not part of a number, or of a place in a recording.
-pub(super) const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
-const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, or best is typed";
 
 pub(super) fn key(
     model: &mut Model,
@@ -172,7 +168,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
     }
     let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds), #7 (a trial) or best");
     let mut time_s = 0.0;
-    let parts: Vec<&str> = text.split(':').collect();
+    let parts: Vec<&str> = text.strip_suffix('s').unwrap_or(text).split(':').collect();
     for (index, part) in parts.iter().enumerate() {
         let number =
             part.trim().replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
