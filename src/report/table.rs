@@ -20,8 +20,8 @@ pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> S
     text + "  " + &verdict(row)
 }
 
-/// The best trial as a line, with what the sampler's model says of it and its gains that differ from `configured`, the newest configuration, or a line
-/// about its absence.
+/// The best trial as a line, with what the sampler's model says of it and its gains that differ from `configured`, the newest
+/// configuration, or a line about its absence.
 pub fn best_line(
     best: Option<&TrialRecord>,
     model: Option<ModelBest>,

@@ -199,7 +199,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
 
     // Regression: in the log the verdicts of the session before had the time of this one, and values by hand were not marked.
     session.send("6");
-    session.wait_for(&["of an earlier session: accept, J = 0.235 m by hand"]);
+    session.wait_for(&["of another session: accept, J = 0.235 m by hand"]);
     session.send("1");
 
     // The best trial of the session before is laid under the charts, once its recording is read.

@@ -293,7 +293,7 @@ impl Experiment {
                 let next = self.study.waiting().next().map(|trial| trial.number);
                 let full = |study: &Study| self.queue.occupied(study.trials()) >= self.plan.budget;
                 // The journal does not have the last verdict yet.
-                if !open.approved().is_beyond_budget() && full(&self.study) && full(&self.study_with_verdict()?) {
+                if full(&self.study) && !open.approved().is_beyond_budget() && full(&self.study_with_verdict()?) {
                     self.log("other workers have run the trials that were left".to_owned());
                     self.propose()?;
                 } else if next != open.waits_as() && !open.is_changed() {

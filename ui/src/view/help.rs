@@ -12,7 +12,8 @@ use crate::theme::Role;
 /// Columns before the text of an action.
 pub const INDENT: usize = 13;
 
-/// The keys by group: in a replay those of the replay first and none that commands a robot, and while a trial waits for its verdict those of the verdict.
+/// The keys by group: in a replay those of the replay first and none that commands a robot, and while a trial waits for its verdict
+/// those of the verdict.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
