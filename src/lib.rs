@@ -42,7 +42,7 @@
 //! ui         -> the engine's public interface          draws and sends requests; decides nothing
 //! engine     -> everything below                       starts the threads and connects them
 //! config     -> everything below but report, session   files to checked values
-//! report     -> recording, optimize, control, telemetry, robot, trial    figures, pages and tables of studies
+//! report     -> recording, optimize, control, telemetry, robot, trial, printable    figures, pages and tables of studies
 //! session    -> optimize, recording, control, sim, realtime, telemetry, trial, robot    proposes, runs and judges trials
 //! recording  -> telemetry, trial, optimize, robot      writes and reads sessions
 //! control    -> telemetry, realtime, trial, robot      computes the torques of a tick
@@ -50,6 +50,7 @@
 //! realtime   -> telemetry, robot                       threads, scheduling, clock, channels
 //! telemetry  -> robot, trial                           data across the real-time boundary
 //! optimize, robot, trial -> nothing of ours            samplers and studies | the machine | vocabulary of a trial
+//! printable  -> nothing of ours                        characters that act on a terminal, for report and engine
 //! ```
 //!
 //! `tests/architecture.rs` checks these rules. `docs/architecture.md` explains the structure and how to add a task, a robot, a
@@ -72,6 +73,7 @@ pub mod config;
 pub mod control;
 pub mod engine;
 pub mod optimize;
+pub mod printable;
 pub mod realtime;
 pub mod recording;
 pub mod report;

@@ -2,8 +2,9 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::page::{Block, Cell, Column, Page, Table, is_unprintable, printable};
+use super::page::{Block, Cell, Column, Page, Table};
 use super::svg;
+use crate::printable::{is_unprintable, printable};
 
 /// Marks a file as a report, which may be overwritten by the next one.
 pub const GENERATOR: &str = "quadfrog report";

@@ -8,8 +8,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::figure::{Axis, Figure, LIMIT_STYLE, Panel, PointMarker, Series, Shape, Style, thinned};
-use super::page::printable;
 use super::ticks::{decimals, padded, round_ticks};
+use crate::printable::printable;
 
 /// Beginning of a figure's file.
 const HEADER: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!-- quadfrog report -->\n";

@@ -1,6 +1,7 @@
 //! A page as text for a terminal.
 
-use super::page::{Block, Cell, Column, Page, Table, is_unprintable, printable};
+use super::page::{Block, Cell, Column, Page, Table};
+use crate::printable::{is_unprintable, printable};
 
 /// Least width of a column of wrapped text, characters.
 const LEAST_TEXT: usize = 16;

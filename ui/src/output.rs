@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
-use quadfrog::report::page::is_unprintable;
+use quadfrog::printable::is_unprintable;
 
 use crate::wrap::wrap_sentence;
 

@@ -9,9 +9,9 @@ use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
 use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, line, make_socket_folder, read_message};
+use crate::printable::is_unprintable;
 use crate::realtime::channel::StopLatch;
 use crate::recording::record::LogLevel;
-use crate::report::page::is_unprintable;
 
 /// Most connections at a time; further ones are closed.
 const MOST_OBSERVERS: usize = 8;

@@ -14,7 +14,7 @@ use nix::unistd::{User, getuid};
 use quadfrog::config::Config;
 use quadfrog::engine::{Provenance, check_kept_config, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
-use quadfrog::report::page::is_unprintable;
+use quadfrog::printable::is_unprintable;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::Network;
 use quadfrog::trial::Task;

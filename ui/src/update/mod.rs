@@ -12,8 +12,8 @@ mod records;
 mod rejudged;
 mod request;
 
+use quadfrog::printable::is_unprintable;
 use quadfrog::recording::record::LogLevel;
-use quadfrog::report::page::is_unprintable;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 

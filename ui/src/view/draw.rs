@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
-use quadfrog::report::page::is_unprintable;
+use quadfrog::printable::is_unprintable;
 use quadfrog::trial::{ExpectedResult, Verdict};
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
