@@ -7,7 +7,6 @@
 
 use super::ask::Direction;
 use super::trial::{GAINS, Trial, TrialState, value_of};
-use serde_json::Value;
 use std::f64::consts::PI;
 
 /// Least repeats of a contender before its spread is used.
@@ -49,21 +48,43 @@ impl RepeatedPoint {
     }
 }
 
+/// The result of one trial of a point; `G` holds the gains with which it ran.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RepeatResult<'a, G> {
+    /// Number of the trial.
+    pub trial: u32,
+    /// Parameters of the trial.
+    pub parameters: &'a [(String, f64)],
+    /// Gains of the trial.
+    pub gains: G,
+    /// Value of the trial.
+    pub value: f64,
+    /// Whether the trial was a fall.
+    pub is_fall: bool,
+}
+
 /// All points with a complete trial, in the order of their first trials.
 pub fn points(trials: &[Trial]) -> Vec<RepeatedPoint> {
-    let mut points: Vec<(Option<&Value>, RepeatedPoint)> = Vec::new();
     let complete = trials.iter().filter(|t| t.state == TrialState::Complete);
-    for (trial, value) in complete.filter_map(|t| Some((t, t.value?))) {
-        let (parameters, gains) = (&trial.parameters, trial.user_attributes.get(GAINS));
+    points_of(complete.filter_map(|t| {
+        let gains = t.user_attributes.get(GAINS);
+        Some(RepeatResult { trial: t.number, parameters: &t.parameters, gains, value: t.value?, is_fall: t.is_fall() })
+    }))
+}
+
+/// The points of results with equal parameters and gains, in the order of their first results.
+pub fn points_of<'a, G: PartialEq>(results: impl IntoIterator<Item = RepeatResult<'a, G>>) -> Vec<RepeatedPoint> {
+    let mut points: Vec<(G, RepeatedPoint)> = Vec::new();
+    for RepeatResult { trial, parameters, gains, value, is_fall } in results {
         let known = points.iter().position(|(g, point)| *g == gains && same(&point.parameters, parameters));
         let index = known.unwrap_or(points.len());
         if index == points.len() {
-            points.push((gains, RepeatedPoint { parameters: parameters.clone(), ..RepeatedPoint::default() }));
+            points.push((gains, RepeatedPoint { parameters: parameters.to_vec(), ..RepeatedPoint::default() }));
         }
         let point = &mut points[index].1;
-        point.trials.push(trial.number);
+        point.trials.push(trial);
         point.values.push(value);
-        point.without_fall += usize::from(!trial.is_fall());
+        point.without_fall += usize::from(!is_fall);
     }
     points.into_iter().map(|(_, point)| point).collect()
 }
@@ -99,10 +120,19 @@ pub fn best(trials: &[Trial], direction: Direction) -> Option<&Trial> {
 
 /// The best `count` points by mean value, best first; earlier ones first among equals.
 pub fn contenders(trials: &[Trial], direction: Direction, count: usize) -> Vec<RepeatedPoint> {
-    let mut points = points(trials);
+    contenders_of(points(trials), direction, count)
+}
+
+/// The best `count` of some points, as [`contenders`].
+pub fn contenders_of(mut points: Vec<RepeatedPoint>, direction: Direction, count: usize) -> Vec<RepeatedPoint> {
     points.sort_by(|a, b| direction.best_first(a.mean(), b.mean()));
     points.truncate(count);
     points
+}
+
+/// The number of repeats that the points need at least to be compared: each of them [`LEAST_REPEATS`] jumps.
+pub fn least_repeats<'a>(compared: impl IntoIterator<Item = &'a RepeatedPoint>) -> usize {
+    compared.into_iter().map(|point| LEAST_REPEATS.saturating_sub(point.repeats())).sum()
 }
 
 /// Next step in the confirmation of the best of some points.

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::attributes::{self, Conclusion, RunningConfirmation, StudyAttributes};
 use crate::optimize::ask::Direction;
-use crate::optimize::repeats::{Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
+use crate::optimize::repeats::{self, Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::PointRecord;
@@ -237,7 +237,7 @@ fn too_few_jumps() -> String {
 
 /// Returns the number of repeats that the points of these first trials need at least to be compared.
 pub fn least_repeats(first_trials: &[u32], study: &Study) -> u32 {
-    compared(first_trials, study).iter().map(|point| LEAST_REPEATS.saturating_sub(point.repeats()) as u32).sum()
+    repeats::least_repeats(&compared(first_trials, study)) as u32
 }
 
 pub fn running(study: &Study) -> Option<RunningConfirmation> {

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use quadfrog::optimize::ask::Direction;
-use quadfrog::optimize::repeats::{LEAST_REPEATS, improvements};
+use quadfrog::optimize::repeats::{RepeatResult, contenders_of, improvements, least_repeats, points_of};
 use quadfrog::trial::{ParameterInfo, PointRecord, PredictedTrial, TrialRecord, Verdict};
 
 use crate::column::Column;
@@ -67,28 +67,20 @@ impl Trials {
         improvements(accepted, mean, Direction::Maximize)
     }
 
-    /// Repeats that a confirmation of the best needs at least: each of the `contenders` best points is compared from
-    /// [`LEAST_REPEATS`] jumps on.
+    /// Repeats that a confirmation of the best needs at least: of the `contenders` best points those with an
+    /// accepted trial are compared.
     pub fn least_repeats(&self, contenders: usize) -> usize {
-        let mut points: Vec<(&TrialRecord, Vec<f64>, bool)> = Vec::new();
-        for (row, value) in self.records.values().filter_map(|row| Some((row, row.value.filter(|_| row.has_result())?)))
-        {
-            let same = |point: &&mut (&TrialRecord, Vec<f64>, bool)| {
-                (&point.0.parameters, &point.0.gains) == (&row.parameters, &row.gains)
-            };
-            let stood = row.verdict == Some(Verdict::Accept);
-            match points.iter_mut().find(same) {
-                Some((_, values, any_stood)) => {
-                    values.push(value);
-                    *any_stood |= stood;
-                }
-                None => points.push((row, vec![value], stood)),
-            }
-        }
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        points.sort_by(|(_, a, _), (_, b, _)| mean(b).total_cmp(&mean(a)));
-        let compared = points.iter().take(contenders).filter(|(.., stood)| *stood);
-        compared.map(|(_, values, _)| LEAST_REPEATS.saturating_sub(values.len())).sum()
+        let results = self.records.values().filter_map(|row| {
+            Some(RepeatResult {
+                trial: row.trial,
+                parameters: &row.parameters,
+                gains: &row.gains,
+                value: row.value.filter(|_| row.has_result())?,
+                is_fall: row.verdict != Some(Verdict::Accept),
+            })
+        });
+        let best = contenders_of(points_of(results), Direction::Maximize, contenders);
+        least_repeats(best.iter().filter(|point| point.without_fall > 0))
     }
 
     /// Attempts at the parameters of a trial up to it: 1, or one more than the trial that it repeats.
