@@ -9,7 +9,12 @@ use crate::trial::{JumpRow, ParameterInfo, ParameterValues, TrialRecord, Verdict
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
-    let mut text = format!("trial {:>3}", row.trial);
+    format!("trial {:>3}{}", row.trial, after_number(row, unit, units))
+}
+
+/// The part of [`line()`] behind the number.
+fn after_number(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
+    let mut text = String::new();
     for (name, value) in &row.parameters {
         let of = units.get(name).map_or("", String::as_str);
         let _ = write!(text, "  {name} {value:.*} {of}", digits(of));
@@ -30,7 +35,7 @@ pub fn best_line(
     units: &HashMap<String, String>,
 ) -> String {
     let Some(best) = best else { return "No trial was accepted.\n".to_owned() };
-    let mut text = format!("Best: {}\n", line(best, unit, units));
+    let mut text = format!("Best: trial {}{}\n", best.trial, after_number(best, unit, units));
     if let Some(ModelBest { predicted, predicted_deviation, .. }) = model.filter(|model| model.trial == best.trial) {
         let _ = writeln!(
             text,

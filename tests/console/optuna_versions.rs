@@ -187,7 +187,7 @@ fn a_foreign_study_has_its_own_table_and_the_best_of_a_minimized_one_is_the_smal
     let show = text(&program, &["study", "show", "floats.log"]);
     assert!(!show.contains("queued") && !show.contains("accept"), "{show}");
     assert_eq!(show.matches('*').count(), 1, "{show}");
-    assert_shows(&show, &[&format!("*{best} "), &format!("Best: trial   {best} ")]);
+    assert_shows(&show, &[&format!("*{best} "), &format!("Best: trial {best} ")]);
 
     // Choices and whole numbers are shown as what they are.
     Optuna::Five.run(&program, &["create", "mixed.log", "minimize"]);

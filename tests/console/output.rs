@@ -271,3 +271,25 @@ fn a_path_in_a_dialog_is_broken_behind_a_slash() {
         assert!(line.trim_end_matches(['│', ' ']).ends_with('/'), "{screen}");
     }
 }
+
+/// Regression: the cause of a fall was broken in the middle of a word at the width of the terminal.
+#[test]
+fn the_trials_of_a_study_in_a_terminal_are_broken_between_words() {
+    let program = Program::new();
+    program.write("fall/safety.toml", "[fall]\npitch_rad = 0.02\n");
+    program.text(&["optimize", "--config", "fall", "--trials", "2", "--seed", "1", "--output", "recordings"]);
+    let study = program.study("recordings");
+    let show = ["study", "show", study.to_str().unwrap()];
+    let piped = program.text(&show);
+    let long: Vec<&str> = piped.lines().filter(|line| line.contains("fall: pitch")).collect();
+    assert!(!long.is_empty() && long.iter().all(|line| line.chars().count() > 80), "one line in a pipe: {piped}");
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(show);
+    let mut session = Session::run(&program.path(""), (80, 60), command);
+    session.wait();
+    let rows = session.screen();
+    for word in long.iter().flat_map(|line| line.split_whitespace()) {
+        assert!(rows.lines().any(|row| row.split(' ').any(|shown| shown == word)), "{word} is broken:\n{rows}");
+    }
+    assert!(rows.lines().any(|row| row.starts_with("       ") && row.contains("rad")), "{rows}");
+}

@@ -38,7 +38,7 @@ fn studies_are_listed_and_shown() {
         show.contains("forward-seed0") && show.contains("robot: go1") && show.contains("Fz from 150 to 350 N"),
         "{show}"
     );
-    assert!(show.contains("f0 (Hz)") && show.contains("Best: trial"), "{show}");
+    assert!(show.contains("f0 (Hz)") && show.contains("Best: trial ") && !show.contains("Best: trial  "), "{show}");
     let best = program.text(&["study", "best", &format!("{study}/study.log")]);
     assert!(show.ends_with(&best), "{best}");
     assert!(program.text(&["study", "list", "."]).contains("no study"));

@@ -8,8 +8,9 @@ use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
 use quadfrog::printable::is_unprintable;
+use ratatui::text::Line;
 
-use crate::wrap::wrap_sentence;
+use crate::wrap::{wrap, wrap_sentence};
 
 /// The first error of standard output; a reader that has closed the pipe is none.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
@@ -96,6 +97,14 @@ pub fn unbroken(words: &str, whole: &str) {
         Some(columns) if both.chars().count() > columns => line(&format!("{}\n    {whole}", words.trim_end())),
         _ => line(&both),
     }
+}
+
+/// Prints text on standard output as [`text`]; on a terminal lines that are longer continue at a word, behind `indent` spaces.
+pub fn wrapped_text(text: &str, indent: usize) {
+    let Some(columns) = columns(io::stdout().is_terminal()) else { return self::text(text) };
+    let shown = printable(text);
+    let lines = shown.lines().flat_map(|line| wrap(&Line::from(line), columns, indent));
+    self::text(&lines.map(|line| format!("{line}\n")).collect::<String>());
 }
 
 /// The columns of the terminal; none without one.

@@ -188,6 +188,9 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
 /// parameters.
 const OWN_SENTENCES: [&str; 4] = ["confirm", "confirmed", "fixed", "model_best"];
 
+/// Spaces before the rest of a line of `show` that is longer than a line of the terminal: the column behind the trial's number.
+const CONTINUED_INDENT: usize = 7;
+
 /// Returns the value of an attribute without the syntax of JSON; `between` separates the elements of a list.
 fn in_words(value: &Value, between: &str) -> String {
     let join = |parts: &mut dyn Iterator<Item = String>, between: &str| parts.collect::<Vec<_>>().join(between);
@@ -207,8 +210,8 @@ fn in_words(value: &Value, between: &str) -> String {
 fn show(selector: &StudySelector) -> Result<(), Failure> {
     let opened = selector.open()?;
     let Opened { study, ours, parameters } = &opened;
+    output::unbroken(&format!("{} in", study.options().name), &parse_storage(&selector.place).to_string());
     let mut text = String::new();
-    let _ = writeln!(text, "{} in {}", study.options().name, parse_storage(&selector.place));
     // The causes of changed verdicts stand in the table; the values that are changed for the next trial are the console's.
     let own = |name: &str| ours.is_some() && (OWN_SENTENCES.contains(&name) || name.starts_with(CHANGED_PREFIX));
     let left_out = |name: &str, value: &Value| name.starts_with(CHANGED_VERDICT) || value.is_null() || own(name);
@@ -275,7 +278,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     if let (Some(jumps), Some(ours)) = (jumps.filter(|jumps| jumps.len() > 1), ours) {
         text += &table::jumps(jumps, ours.task.unit());
     }
-    output::text(&text);
+    output::wrapped_text(&text, CONTINUED_INDENT);
     Ok(())
 }
 
