@@ -254,6 +254,11 @@ fn the_commands_at_the_end_of_a_session_begin_in_a_line_of_their_own() {
         shown,
         &["continue the study:\r\n    quadfrog --resume /", "play the recording:\r\n    quadfrog replay /"],
     );
+    // Regression: neither command that shows the results was named.
+    assert_shows(
+        shown,
+        &["show its trials:\r\n    quadfrog study show /", "make its report:\r\n    quadfrog report /"],
+    );
 }
 
 /// Regression: a path in a dialog was broken in the middle of a name.

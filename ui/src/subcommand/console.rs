@@ -228,6 +228,8 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if let Some(recording) = recording {
         output::unbroken("  play the recording: ", &format!("quadfrog replay {}", recording.display()));
     }
+    output::unbroken("  show its trials:    ", &format!("quadfrog study show {}", folder.display()));
+    output::unbroken("  make its report:    ", &format!("quadfrog report {}", folder.display()));
     for part in incomplete {
         output::unbroken("  repair an incomplete recording: ", &format!("quadfrog recover {}", part.display()));
     }
