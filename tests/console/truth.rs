@@ -309,7 +309,7 @@ fn a_silent_robot_has_no_battery_temperature_and_clock() {
     };
     shown(&mut console, 495, Mode::Ready);
     console.press(&["5"]);
-    assert_shows(&console.screen(120, 40), &["hottest 45 C", "battery 71 %", "robot clock  0.5 s"]);
+    assert_shows(&console.screen(120, 40), &["hottest 45 C", "battery 71 %", "robot clock  0.5 s since its start"]);
     (500..700).step_by(5).for_each(|time_ms| shown(&mut console, time_ms, Mode::Fault));
     for (columns, rows) in [(80, 24), (120, 40)] {
         let screen = console.screen(columns, rows);

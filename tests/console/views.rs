@@ -255,13 +255,13 @@ fn a_trial_without_a_trace_cannot_be_a_ghost() {
     let mut console = jumped(&[1]);
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     console.press(&["2", "Home", "c"]);
-    let earlier = "trial 0 was recorded in an earlier session: quadfrog replay recordings/forward shows it";
-    assert_eq!(console.said(), earlier);
+    let elsewhere = "trial 0 was recorded in another session: quadfrog replay recordings/forward shows it";
+    assert_eq!(console.said(), elsewhere);
     // Elsewhere than in Trials the best trial is laid under the charts.
     let mut resumed = Console::ready();
     resumed.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
     resumed.press(&["c"]);
-    assert_eq!(resumed.said(), earlier);
+    assert_eq!(resumed.said(), elsewhere);
 }
 
 /// Regression: after `--resume` the review charts lacked the best trial although its recording exists.

@@ -40,7 +40,7 @@ impl Column {
             Column::Source => "source of the parameters",
             Column::Risk => "falls among the nearest trials before it ran",
             Column::Time => "when it ran, since the session began",
-            Column::Cause => "cause and note",
+            Column::Cause => "note and cause",
         }
     }
 }

@@ -60,7 +60,7 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             require(model.trial_in_view().is_some(), &model.session.no_trial_yet())
         }
         A::Ghost => {
-            // Of a trial of an earlier session it says where that is.
+            // Of a trial of another session it says where that is.
             let known = model.history.traces().next().is_some() || model.session.trials.best().is_some();
             require(known, "no jump has been recorded yet")
         }

@@ -164,7 +164,7 @@ fn no_signals(model: &Model, trial: u32) -> String {
     let study = Path::new(&model.session.info.study).parent().unwrap_or(Path::new("")).display();
     match model.session.trials.ran.contains_key(&trial) {
         true => format!("the signals of trial {trial} are not kept any longer: quadfrog replay {study} shows them"),
-        false => format!("trial {trial} was recorded in an earlier session: quadfrog replay {study} shows it"),
+        false => format!("trial {trial} was recorded in another session: quadfrog replay {study} shows it"),
     }
 }
 

@@ -262,7 +262,8 @@ fn robot_rows(model: &Model) -> Vec<HealthRow> {
     }
     // What a silent robot has sent last is no value of now.
     let heard = !model.robot_is_silent();
-    let clock = if heard { format!("{:.1} s", f64::from(tick.state.robot_time_ms) / 1e3) } else { "-".to_owned() };
+    let robot_s = f64::from(tick.state.robot_time_ms) / 1e3;
+    let clock = if heard { format!("{robot_s:.1} s since its start") } else { "-".to_owned() };
     rows.push(detail("robot clock", clock, false));
     match tick.state.battery.filter(|_| heard) {
         Some(battery) => {
