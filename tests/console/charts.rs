@@ -1,9 +1,11 @@
 //! The charts of the live view: every signal, axes, limits, commands beside measurements.
 
-use crate::support::{Console, assert_shows, tick};
+use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
+use quadfrog::recording::record::Record;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JOINTS, joint_name};
-use quadfrog::telemetry::{Snapshot, Tick};
+use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
+use quadfrog::trial::{Backend, ExperimentStage, Verdict};
 use quadfrog_console::message::Msg;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
@@ -201,4 +203,72 @@ fn twelve_joints_are_in_numbers_at_120x40_in_one_order() {
     assert!(places.is_sorted(), "FR FL RR RL, hip thigh calf: {places:?}\n{screen}");
     assert_shows(&screen, &["-12.3"]);
     assert!(!screen.contains("-0.0 "), "{screen}");
+}
+
+/// Regression: beside a plot of two rows the lowest value stood in the row of zero.
+#[test]
+fn a_chart_of_two_rows_names_its_range_and_no_row() {
+    let mut console = charting(&["roll"]);
+    (0..200).for_each(|step| drop(console.update(Msg::Tick(Box::new(distinct(5 * step))))));
+    let torques = |console: &mut Console, columns, rows| {
+        (0..6)
+            .map(|_| {
+                console.press(&["t"]);
+                console.screen(columns, rows)
+            })
+            .find(|screen| screen.contains("FR_hip torque"))
+            .expect("torques")
+    };
+    let screen = torques(&mut console, 120, 40);
+    assert_shows(&line_with(&screen, "FR_hip torque"), &["-10 to 10"]);
+    for row in screen.lines().skip_while(|line| !line.contains("FR_hip torque")).skip(1).take(2) {
+        assert!(row.starts_with("      "), "no value beside {row}\n{screen}");
+    }
+    // Without room in the heading.
+    let screen = torques(&mut console, 80, 24);
+    let rows: Vec<&str> = screen.lines().skip_while(|line| !line.contains("FR_hip torque")).take(3).collect();
+    assert!(rows[1].starts_with("  ±10 ") && rows[2].starts_with("      "), "{screen}");
+    // Where there are more rows, each value stands beside its own.
+    let screen = torques(&mut console, 120, 60);
+    assert!(!line_with(&screen, "FR_hip torque").contains("-10 to 10"), "{screen}");
+}
+
+/// Regression: before the feet of a simulated robot were loaded in the countdown, they were said to be in the air.
+#[test]
+fn no_foot_is_in_the_air_while_a_simulated_robot_is_placed() {
+    let mut console = charting(&["FR foot z", "RR foot z"]);
+    console.record(Record::Session(session()));
+    let mut placed = |backend, contact: bool| {
+        console.model.session.info.backend = Some(backend);
+        let mut tick = tick(1_000, 0.0, Some((4, -2.0, Phase::Stance)));
+        tick.estimate.contact = [contact; 4];
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+        console.tick(tick);
+        console.screen(120, 40)
+    };
+    let screen = placed(Backend::Simulator, false);
+    assert!(screen.contains("being placed") && !screen.contains('○'), "{screen}");
+    assert_shows(&placed(Backend::Simulator, true), &["FR● FL● RR● RL●", "FR foot z●"]);
+    // A real robot stands where it stands.
+    assert_shows(&placed(Backend::Hardware, false), &["FR○ FL○ RR○ RL○", "FR foot z○"]);
+}
+
+/// Regression: feet of the end of the trial and of the present stood side by side without a word.
+#[test]
+fn the_picture_says_that_it_shows_the_present_where_the_charts_do_not() {
+    let mut console = charting(&["FR foot z"]);
+    console.record(Record::Session(session()));
+    console.record(Record::Proposal(proposal(0, 0)));
+    console.stage(ExperimentStage::Running, 0);
+    for time_ms in (0..1_000).step_by(5) {
+        console.tick(tick(time_ms, 0.0, Some((0, time_ms as f64 / 1e3 - 0.5, Phase::Flight))));
+    }
+    assert_shows(&console.screen(200, 60), &["Robot ─"]);
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    console.mode(Mode::Review);
+    assert_shows(&console.screen(200, 60), &["Robot now ─"]);
+    // The charts show the present, too.
+    console.press(&["z"]);
+    assert_shows(&console.screen(200, 60), &["Robot ─"]);
 }

@@ -83,6 +83,13 @@ pub struct JointSample {
     pub temperature: [f32; JOINTS],
 }
 
+impl ChartSample {
+    /// Whether no foot is down in a countdown: a simulator that places the robot has not loaded its feet yet.
+    pub fn is_before_footing(&self) -> bool {
+        self.trial.is_some() && self.trial_time_s < 0.0 && !self.contact.contains(&true)
+    }
+}
+
 impl From<&Tick> for JointSample {
     fn from(tick: &Tick) -> JointSample {
         let (state, motor) = (&tick.state, &tick.command.motor);

@@ -25,6 +25,8 @@ pub struct TimeAxis {
 
 /// Columns of a vertical axis with its values.
 const AXIS: u16 = 6;
+/// Rows of a plot up to which its axis has no values beside the rows.
+const ROWS_WITHOUT_TICKS: u16 = 2;
 
 /// The part of a chart's area in which the curves are.
 pub fn plot_columns(area: Rect) -> Rect {
@@ -104,8 +106,12 @@ impl Chart<'_> {
         }
         let plot = plot_columns(Rect { y: area.y + 1, height: area.height - 1, ..area });
         let (low, high) = self.range;
-        self.draw_heading(buffer, Rect { height: 1, ..area });
-        self.draw_ticks(buffer, plot, (low, high));
+        let used = self.draw_heading(buffer, Rect { height: 1, ..area });
+        if plot.height <= ROWS_WITHOUT_TICKS {
+            self.draw_range(buffer, Rect { height: 1, ..area }, used, plot);
+        } else {
+            self.draw_ticks(buffer, plot, (low, high));
+        }
         self.draw_zero(buffer, plot, (low, high));
         self.draw_limits(buffer, plot, (low, high));
         if let Some(ghost) = self.ghost {
@@ -124,21 +130,32 @@ impl Chart<'_> {
         self.draw_cursor(buffer, plot);
     }
 
+    /// The ends of the vertical axis of a plot with few rows, in which a value in the middle would stand beside an end: at the
+    /// right of the heading, of which `used` columns are taken, or else beside the plot if they are opposite.
+    fn draw_range(&self, buffer: &mut Buffer, heading: Rect, used: usize, plot: Rect) {
+        let ((low, high), style) = (self.range, self.theme.style(Role::Quiet));
+        let text = format!("{} to {}", tick_text(low), tick_text(high));
+        let columns = text.chars().count();
+        if used + 2 + columns <= usize::from(heading.width) {
+            buffer.set_string(heading.right() - columns as u16, heading.y, text, style);
+        } else if low == -high {
+            let text = format!("{}{}", self.theme.plus_minus(), tick_text(high));
+            let text = format!("{text:>width$}", width = usize::from(AXIS) - 1);
+            buffer.set_stringn(plot.x - AXIS, plot.y, text, usize::from(AXIS), style);
+        }
+    }
+
     /// The values at the ends and in the middle of the vertical axis.
     fn draw_ticks(&self, buffer: &mut Buffer, plot: Rect, (low, high): (f32, f32)) {
         let x = plot.x.saturating_sub(AXIS);
         let mut tick = |row: u16, value: f32| {
-            let digits = format!("{value:.2}");
-            let digits = digits.trim_end_matches('0').trim_end_matches('.');
-            let text = format!("{digits:>width$}", width = usize::from(AXIS) - 1);
+            let text = format!("{:>width$}", tick_text(value), width = usize::from(AXIS) - 1);
             buffer.set_string(x, plot.y + row, text, self.theme.style(Role::Quiet));
         };
         tick(0, high);
-        if plot.height > 1 {
-            tick(plot.height - 1, low);
-        }
+        tick(plot.height - 1, low);
         // Of an even number of rows the lower one, where the line at zero is.
-        if self.middle_tick && plot.height > 2 {
+        if self.middle_tick {
             tick(plot.height / 2, (low + high) / 2.0);
         }
     }
@@ -163,16 +180,16 @@ impl Chart<'_> {
         }
     }
 
-    /// Name, contact indicator and value.
-    fn draw_heading(&self, buffer: &mut Buffer, area: Rect) {
+    /// Name, contact indicator and value. Returns the columns that they take.
+    fn draw_heading(&self, buffer: &mut Buffer, area: Rect) -> usize {
         let theme = &self.theme;
         let sample = match self.cursor_ns {
             Some(time_ns) => self.history.at(time_ns),
             None => self.history.samples().next_back(),
         };
-        let contact = match (self.style.foot, sample) {
-            (Some(leg), Some(sample)) if sample.heard => theme.contact_indicator(sample.contact[leg as usize]),
-            (Some(_), _) => " ",
+        let contact = match (self.style.foot, sample.and_then(|sample| self.style.contact(sample))) {
+            (Some(_), Some(contact)) => theme.contact_indicator(contact),
+            (Some(_), None) => " ",
             (None, _) => "",
         };
         let value = |decimals| sample.map_or("-".to_owned(), |sample| self.number(sample, decimals));
@@ -212,6 +229,7 @@ impl Chart<'_> {
             buffer.set_string(area.x + used as u16, area.y, &text, theme.style(role));
             used += text.chars().count();
         }
+        used
     }
 
     /// The value to some decimals, or none from 100 on; `-` for no number.
@@ -295,6 +313,12 @@ impl Chart<'_> {
             buffer.set_string(plot.x + column as u16, y, self.theme.bar(), self.theme.style(role));
         }
     }
+}
+
+/// A value of the vertical axis: 0.25, -30.
+fn tick_text(value: f32) -> String {
+    let digits = format!("{value:.2}");
+    digits.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// Distances of the marks on the time axis, s, and columns between two of them at least.

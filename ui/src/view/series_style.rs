@@ -1,6 +1,7 @@
 //! The drawing of each series: its value in a sample, its ranges, its limits, its colour.
 
 use quadfrog::robot::{JOINTS, LEGS, Leg};
+use quadfrog::trial::Backend;
 
 use crate::model::Model;
 use crate::model::history::ChartSample;
@@ -16,6 +17,8 @@ pub struct SeriesStyle {
     pub role: Role,
     /// The foot whose contact indicator stands beside the name.
     pub foot: Option<Leg>,
+    /// Whether the robot is simulated: it is placed for its trial.
+    pub simulated: bool,
     /// Lower and upper limit; no number where there is none.
     pub limits: [f32; 2],
 }
@@ -43,6 +46,12 @@ impl SeriesStyle {
             SeriesKind::Speed(joint) => joints.speed[joint],
             SeriesKind::Temperature(joint) => joints.temperature[joint],
         }
+    }
+
+    /// The contact of its foot in a sample; none for a series without a foot, of a silent robot, and while a simulated one is placed.
+    pub fn contact(&self, sample: &ChartSample) -> Option<bool> {
+        let known = sample.heard && !(self.simulated && sample.is_before_footing());
+        self.foot.filter(|_| known).map(|leg| sample.contact[leg as usize])
     }
 
     /// The command for its value in a sample, no number while the robot sends no states; none for a series that is not commanded.
@@ -89,7 +98,9 @@ pub fn style(series: Series, model: &Model) -> SeriesStyle {
         SeriesKind::Speed(joint) => (SPEED, role_of_joint(joint)),
         SeriesKind::Temperature(joint) => (TEMPERATURE, role_of_joint(joint)),
     };
-    SeriesStyle { series, ranges, role, foot: series.foot(), limits: limits(kind, model).unwrap_or([f32::NAN; 2]) }
+    let simulated = model.session.info.backend == Some(Backend::Simulator);
+    let limits = limits(kind, model).unwrap_or([f32::NAN; 2]);
+    SeriesStyle { series, ranges, role, foot: series.foot(), simulated, limits }
 }
 
 /// The limits of a series, as far as they are known: of the fall detector, of the joints, and the motors' temperature that is

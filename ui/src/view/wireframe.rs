@@ -3,6 +3,7 @@
 
 use nalgebra::{Point2, UnitQuaternion, Vector3};
 use quadfrog::robot::{Leg, leg_of};
+use quadfrog::trial::Backend;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
@@ -12,6 +13,7 @@ use super::drawing::Drawing;
 use super::robot_shape::{leg_points, trunk_edges};
 use super::scene::{Scene, steady};
 use crate::model::Model;
+use crate::model::history::ChartSample;
 use crate::theme::Role;
 
 /// Half of the picture's width without a jump, m: the robot with its legs stretched.
@@ -97,8 +99,15 @@ pub fn render(frame: &mut Frame, panel: Rect, model: &Model) {
     let (theme, tick) = (&model.theme, &model.snapshot.tick);
     let contacts =
         Leg::ALL.map(|leg| format!("{}{}", leg.name(), theme.contact_indicator(tick.estimate.contact[leg as usize])));
-    let contacts = if model.robot_is_silent() { String::new() } else { contacts.join(" ") };
-    heading(frame, panel, theme, "Robot", &contacts);
+    let simulated = model.session.info.backend == Some(Backend::Simulator);
+    let contacts = match (model.robot_is_silent(), simulated && ChartSample::from(tick).is_before_footing()) {
+        (true, _) => String::new(),
+        (false, true) => "being placed".to_owned(),
+        (false, false) => contacts.join(" "),
+    };
+    // The charts beside it show another time.
+    let past = model.landed().is_some() || model.live.frozen.is_some() || model.live.comparison.is_some();
+    heading(frame, panel, theme, if past { "Robot now" } else { "Robot" }, &contacts);
     let Some(area) = picture_area(panel) else { return };
     if model.robot_is_silent() {
         frame.render_widget(Line::from(span(theme, Role::Quiet, NO_STATE)), area);
