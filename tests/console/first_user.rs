@@ -154,7 +154,7 @@ fn names_of_numbers_stand_over_a_point_and_points_that_are_left_out_are_counted(
         console.stage(stage, 0);
         for rows in 18..50 {
             let screen = console.screen(80, rows);
-            let points = (0..4).filter(|n| screen.contains(&format!(" #{n}  2/2 "))).count();
+            let points = (0..4).filter(|n| screen.contains(&format!("#{n}    2/2 "))).count();
             assert!(points > 0 || !screen.contains("landed mean, std"), "{screen}");
             match points {
                 4 => assert!(!screen.contains("no room"), "{screen}"),

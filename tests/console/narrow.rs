@@ -37,16 +37,21 @@ fn repeated(unit: &str, confidence: Option<f64>) -> Console {
 #[test]
 fn the_numbers_of_repeated_points_have_names_at_80_columns() {
     let screen = repeated("m", Some(0.96)).screen(80, 24);
-    assert_shows(&line_with(&screen, "landed"), &["#   landed mean, std m   leads"]);
-    assert_shows(&screen, &["#12 2/2    0.442 ±0.050  96 %", "#30 9/10   -0.410 ±0.050\n"]);
+    assert_shows(&line_with(&screen, "landed"), &[" point landed mean, std m  leads"]);
+    assert_shows(&screen, &["*#12   2/2    0.442 ±0.050 96 %", " #30   9/10   -0.410 ±0.050\n"]);
     let screen = repeated("rad", None).screen(80, 24);
-    assert_shows(&screen, &["#   landed mean, std rad\n", "#12 2/2    0.442 ±0.050  leads\n"]);
+    assert_shows(&screen, &[" point landed mean, std rad\n", "*#12   2/2    0.442 ±0.050 leads\n"]);
     // On a wide terminal each line has its words.
     assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["2/2 landed  0.442 m ±0.050  leads, 96 %"]);
+    // Regression: the lines of all points looked like statistics of the best.
+    assert_shows(&screen, &["*best 0.520 rad (#12)"]);
+    let title = "repeated points; *: that of the best";
+    assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["*best 0.520 m (#12)", title, "*#12", " #30"]);
     // A study without repeats has no such line.
     let mut console = repeated("m", None);
     console.record(Record::Points(Vec::new()));
-    assert!(!console.screen(80, 24).contains("mean, std"), "{}", console.screen(80, 24));
+    let screen = console.screen(80, 24);
+    assert!(!screen.contains("mean, std") && screen.contains(" best 0.520 m (#12)"), "{screen}");
 }
 
 /// Regression: `columns (x)` and `by number (s)` went as the counts grew.

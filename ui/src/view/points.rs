@@ -10,47 +10,63 @@ use crate::theme::{Role, Theme};
 /// Columns from which a line names its numbers itself; narrower ones stand below a line that does.
 pub const WORDS_FROM: usize = 40;
 
-/// Columns of mean, standard deviation and the space behind them in a narrow line.
-const MEAN_WIDTH: usize = 14;
+/// Columns of the number of a point, and of mean, standard deviation and the space behind them, in a narrow line.
+const NUMBER_WIDTH: usize = 6;
+const MEAN_WIDTH: usize = 13;
 
-/// A line for each repeated point, best mean first; in few columns below a line that names the numbers.
+/// A line for each repeated point, best mean first.
 pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
     let mut points: Vec<&PointRecord> = session.trials.points.iter().filter(|point| !point.trials.is_empty()).collect();
     points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    if width >= WORDS_FROM {
-        return points.into_iter().map(|point| line(session, theme, point)).collect();
-    }
-    let names = points.first().map(|_| {
-        // Without a confidence the line of the leading point says it.
-        let leads = if points.iter().any(|point| point.confidence.is_some()) { "leads" } else { "" };
-        let mean = format!("mean, std {}", session.info.unit);
-        let names = format!(" {:<4}{:<7}{mean:<MEAN_WIDTH$}{leads}", "#", "landed");
-        Line::from(span(theme, Role::Quiet, names.trim_end()))
-    });
-    names.into_iter().chain(points.into_iter().map(|point| narrow_line(session, theme, point))).collect()
+    let line = if width >= WORDS_FROM { line } else { narrow_line };
+    points.into_iter().map(|point| line(session, theme, point)).collect()
 }
 
-/// The lines of [`lines`] as far as `rows` rows have room: whole points below the names of their numbers, and the number of those
-/// that are left out.
-pub fn within(lines: Vec<Line<'static>>, theme: &Theme, width: usize, rows: usize) -> Vec<Line<'static>> {
+/// The lines of [`lines`] below one that says what they are, and in few columns names their numbers; none without points.
+pub fn titled_lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+    let lines = lines(session, theme, width);
+    if lines.is_empty() {
+        return lines;
+    }
+    let title = match width >= WORDS_FROM {
+        true => " repeated points; *: that of the best".to_owned(),
+        false => {
+            // Without a confidence the line of the leading point says it.
+            let leads = if session.trials.points.iter().any(|point| point.confidence.is_some()) { "leads" } else { "" };
+            let mean = format!("mean, std {}", session.info.unit);
+            let names = format!(" {:<NUMBER_WIDTH$}{:<7}{mean:<MEAN_WIDTH$}{leads}", "point", "landed");
+            names.trim_end().to_owned()
+        }
+    };
+    std::iter::once(Line::from(span(theme, Role::Quiet, title))).chain(lines).collect()
+}
+
+/// The lines as far as `rows` rows have room: whole points below the `titles` lines that name them, and the number of those that are
+/// left out.
+pub fn within(lines: Vec<Line<'static>>, theme: &Theme, titles: usize, rows: usize) -> Vec<Line<'static>> {
     if lines.len() <= rows {
         return lines;
     }
-    let names = usize::from(width < WORDS_FROM);
-    let points = lines.len() - names;
-    // A row names those that are left out; the names stand over a point or not at all.
-    let shown = rows.saturating_sub(names + 1);
+    let points = lines.len() - titles;
+    // A row names those that are left out; the title stands over a point or not at all.
+    let shown = rows.saturating_sub(titles + 1);
     let sign = match shown {
         0 => format!(" {points} points have no room"),
         shown => format!(" {} more have no room", points - shown),
     };
-    let kept = if shown == 0 { 0 } else { names + shown };
+    let kept = if shown == 0 { 0 } else { titles + shown };
     lines.into_iter().take(kept).chain([Line::from(span(theme, Role::Quiet, sign))]).take(rows).collect()
+}
+
+/// The number of a point's first trial; `*` before that of the best.
+fn first_trial(session: &SessionModel, point: &PointRecord) -> String {
+    let has_best = session.trials.best().is_some_and(|best| point.trials.contains(&best.trial));
+    format!("{}#{}", if has_best { "*" } else { " " }, point.trials.first().copied().unwrap_or(0))
 }
 
 /// A line below the names of its numbers.
 fn narrow_line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Line<'static> {
-    let first = point.trials.first().map_or(String::new(), |trial| format!("#{trial}"));
+    let first = first_trial(session, point);
     let landed = format!("{}/{}", point.without_fall, point.trials.len());
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
     let mean = number(point.mean);
@@ -61,7 +77,7 @@ fn narrow_line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Li
         None => String::new(),
     };
     Line::from(vec![
-        span(theme, Role::Quiet, format!(" {first:<4}")),
+        span(theme, Role::Quiet, format!("{first:<width$}", width = NUMBER_WIDTH + 1)),
         Span::raw(format!("{landed:<7}{mean}")),
         span(theme, Role::Quiet, format!("{spread:<room$}")),
         span(theme, Role::Good, confidence),
@@ -69,10 +85,9 @@ fn narrow_line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Li
 }
 
 fn line(session: &SessionModel, theme: &Theme, point: &PointRecord) -> Line<'static> {
-    let first = point.trials.first().copied().unwrap_or(0);
     let spread = point.deviation.map_or(String::new(), |sd| format!(" {}{}", theme.plus_minus(), number(sd)));
     let mut spans = vec![
-        span(theme, Role::Quiet, format!(" {:<5}", format!("#{first}"))),
+        span(theme, Role::Quiet, format!("{:<6}", first_trial(session, point))),
         Span::raw(format!("{}/{} landed ", point.without_fall, point.trials.len())),
         Span::raw(format!(" {} {}", number(point.mean), session.info.unit)),
         span(theme, Role::Quiet, spread),

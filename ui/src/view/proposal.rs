@@ -23,7 +23,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let body = heading(frame, area, &model.theme, &title, "");
     let mut lines = wrap_all(&lines, usize::from(body.width), 1);
     let room = usize::from(body.height).saturating_sub(lines.len());
-    lines.extend(points::within(points, &model.theme, usize::from(area.width), room));
+    lines.extend(points::within(points, &model.theme, 1, room));
     frame.render_widget(Paragraph::new(lines), body);
 }
 
@@ -93,7 +93,7 @@ fn content(model: &Model, width: usize) -> PanelText {
             }
             if let Some(left) = session.confirming() {
                 lines.push(Line::from(span(theme, Role::Warning, format!(" confirming the best: {left} left"))));
-                return PanelText { title, lines, points: points::lines(session, theme, width) };
+                return PanelText { title, lines, points: points::titled_lines(session, theme, width) };
             }
             PanelText::new(title, lines)
         }
@@ -208,8 +208,9 @@ fn finished(model: &Model, width: usize) -> PanelText {
         return PanelText::new(title, vec![Line::from(span(theme, Role::Quiet, " no trial was accepted"))]);
     };
     let value = best.value.map(number).unwrap_or_default();
+    let repeated = points::titled_lines(session, theme, width);
     let mut lines = vec![Line::from(vec![
-        span(theme, Role::Quiet, " best "),
+        span(theme, Role::Quiet, if repeated.is_empty() { " best " } else { "*best " }),
         span(theme, Role::Good, format!("{value} {}", session.info.unit)),
         span(theme, Role::Quiet, format!(" (#{}{})", best.trial, if best.counts_by_hand() { ", by hand" } else { "" })),
     ])];
@@ -228,7 +229,6 @@ fn finished(model: &Model, width: usize) -> PanelText {
         [Span::raw(" "), span(theme, Role::Key, key), span(theme, Role::Quiet, text)]
     };
     let offers: Vec<_> = offers.into_iter().filter(|(action, _)| legal(*action, model).is_ok()).collect();
-    let repeated = points::lines(session, theme, width);
     // The last line of the screen names these keys, too: in few columns their row is that of the points.
     if !offers.is_empty() && (width >= points::WORDS_FROM || repeated.is_empty()) {
         lines.push(Line::from_iter(offers.into_iter().flat_map(offer)));
