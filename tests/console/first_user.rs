@@ -204,7 +204,8 @@ fn counts_that_the_heading_leaves_out_have_a_sign() {
         let some = shown.contains(&true) && shown.contains(&false);
         assert_eq!(heading.contains(", ..;"), some, "{heading}");
     }
-    assert_shows(&console.screen(80, 24), &["by number (s), all (F), columns (x)"]);
+    let counts = "23 accept, 23 fall, 22 void, 4 not run; s by number, F all, x columns";
+    assert_shows(&console.screen(80, 24), &[counts]);
 }
 
 /// Regression: the form of the bounds stayed open over a STOP, and Enter would have changed them.

@@ -1,8 +1,8 @@
 //! Texts of 80 columns and 24 rows that a reader without the manual understands.
 
-use crate::support::{Console, assert_shows, line_with, session, trial};
+use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::recording::record::Record;
-use quadfrog::telemetry::Mode;
+use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
     Verdict,
@@ -62,16 +62,18 @@ fn the_keys_in_the_heading_of_trials_stay_while_the_counts_grow() {
     console.press(&["2"]);
     for count in [3, 30, 300, 999] {
         console.judged(count);
-        assert_shows(&console.screen(80, 24), &[keys]);
-        assert_shows(&console.screen(120, 40), &["void", keys]);
+        // Regression: the counts of verdicts gave way to the words of the keys.
+        assert_shows(&console.screen(80, 24), &["accept, ", "fall, ", "void; ", keys]);
+        assert_shows(&console.screen(120, 40), &["void; ", keys]);
     }
     // The order with the longest name.
     for _ in 0..20 {
         console.press(&["s"]);
-        assert_shows(&console.screen(80, 24), &["(s), all (F), columns (x)"]);
+        let heading = line_with(&console.screen(80, 24), "Trials ─");
+        assert!(heading.contains("333 void; by ") || heading.contains("333 void; s by "), "{heading}");
     }
     console.press(&["S", "F"]);
-    assert_shows(&console.screen(80, 24), &["reversed (s), only accept (F), columns (x)"]);
+    assert_shows(&console.screen(80, 24), &["reversed, F only accept, x columns"]);
 }
 
 /// Regression: the times of the stages took two lines once they had two digits.
@@ -185,4 +187,21 @@ fn live_says_that_a_parameter_is_fixed() {
     // The present proposal has another value, as a queued point has.
     console.record(fixed(90.0, 3));
     assert!(!console.screen(80, 24).contains("fixed"), "{}", console.screen(80, 24));
+}
+
+/// Regression: the sign beside the number of a trial was not explained.
+#[test]
+fn the_sign_of_a_trial_under_the_charts_is_explained() {
+    let mut console = Console::ready();
+    for time_ms in (0..1_000).step_by(5) {
+        console.tick(tick(time_ms, 0.1, Some((0, time_ms as f64 / 1e3 - 0.5, Phase::Impulse))));
+    }
+    console.judged(1);
+    console.press(&["2"]);
+    assert!(!console.screen(120, 40).contains('~'), "{}", console.screen(120, 40));
+    console.press(&["Home", "c"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["Trials, ~ under the charts ", ">  0~ "]);
+    console.press(&["?"]);
+    assert_shows(&console.screen(120, 100), &["under the charts, ~ in Trials"]);
 }

@@ -203,7 +203,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),
         row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, joints, robot; Health: history"),
         row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
-        row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts; a second one: compare both"),
+        row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts, ~ in Trials; a second one: compare both"),
 
         row(A::Sort, "sort", &["s"], G::Tables, "sort by the next column"),
         row(A::Reverse, "reverse", &["S"], G::Tables, "reverse the order"),

@@ -20,26 +20,33 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let later = model.later_trials().count();
     let title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
     let (rows, room) = (model.trial_rows().len(), usize::from(area.height).saturating_sub(2));
-    let whole = if rows > room { format!("{title} ({room} of {rows})") } else { title.clone() };
-    // Where the whole summary has no room, its numbers give way one by one, then the number of rows, the keys last.
+    let number = if rows > room { format!(" ({room} of {rows})") } else { String::new() };
+    let legend = if laid_under(model).any(|_| true) { ", ~ under the charts" } else { "" };
+    let titles = [format!("{title}{legend}{number}"), format!("{title}{number}"), title];
     let summaries = summaries(model);
-    let mut headings = summaries.iter().flat_map(|summaries| {
-        [&whole, &title].into_iter().flat_map(move |title| summaries.iter().map(move |summary| (title, summary)))
-    });
-    let fits = |(title, summary): &(&String, &String)| heading_width(title, summary) <= usize::from(area.width);
-    let (title, summary) = headings.find(fits).map_or((&title, ""), |(title, summary)| (title, summary));
+    // The most important form that has room: the number of rows gives way before a verdict's count.
+    let mut headings =
+        summaries.iter().flat_map(|summary| titles.iter().map(move |title| (title.as_str(), summary.as_str())));
+    let fits = |(title, summary): &(&str, &str)| heading_width(title, summary) <= usize::from(area.width);
+    let (title, summary) = headings.find(fits).unwrap_or((&titles[2], ""));
     let body = heading(frame, area, &model.theme, title, summary);
     render_table(frame, body, model, true);
 }
 
-/// The number of each verdict with the order, filter and columns of the table, from the longest to the shortest: those with all
-/// keys, and those with some. Where the trials are judged again, the result of that.
-fn summaries(model: &Model) -> [Vec<String>; 2] {
+/// The trials that are laid under the charts or under another trial.
+fn laid_under(model: &Model) -> impl Iterator<Item = u32> {
+    let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
+    [model.live.ghost, beside.map(|b| b.trial)].into_iter().flatten()
+}
+
+/// The number of each verdict with the order, filter and columns of the table, from the longest to the shortest: shorter keys before
+/// fewer counts. Where the trials are judged again, the result of that.
+fn summaries(model: &Model) -> Vec<String> {
     if let Some(table) = &model.rejudged {
         // The end of a path names the folder.
         let skipped = table.configuration.chars().count().saturating_sub(24);
         let name: String = table.configuration.chars().skip(skipped).collect();
-        return [vec![format!("new by {name}: {}", table.summary())], Vec::new()];
+        return vec![format!("new by {name}: {}", table.summary())];
     }
     let trials = &model.session.trials;
     let mut counts = Verdict::ALL.map(|verdict| (trials.count(verdict), verdict.name())).to_vec();
@@ -64,15 +71,18 @@ fn summaries(model: &Model) -> [Vec<String>; 2] {
     };
     let turned = if view.reversed { " reversed" } else { "" };
     let [by, only, columns] = [Action::Sort, by_filter, Action::Columns].map(|action| model.keymap.key(action));
-    let order = format!("by {sort}{turned} ({by}), {shown} ({only})");
-    let keys = format!("{order}, columns ({columns})");
+    let keys = format!("by {sort}{turned} ({by}), {shown} ({only}), columns ({columns})");
+    let short_keys = format!("{by} by {sort}{turned}, {only} {shown}, {columns} columns");
+    let mut forms = vec![
+        format!("{}; {keys}", all.join(", ")),
+        format!("{}; {keys}", found.join(", ")),
+        format!("{}; {short_keys}", found.join(", ")),
+    ];
     // `..` stands for counts that are left out.
-    let fewer = (1..=found.len()).rev().map(|count| {
-        let rest = if count < found.len() { ", .." } else { "" };
-        format!("{}{rest}", found[..count].join(", "))
-    });
-    let with_counts = std::iter::once(all.join(", ")).chain(fewer).map(|counts| format!("{counts}; {keys}"));
-    [with_counts.chain([keys.clone()]).collect(), vec![order, format!("{shown} ({only})")]]
+    forms.extend((1..found.len()).rev().map(|count| format!("{}, ..; {short_keys}", found[..count].join(", "))));
+    forms.extend([short_keys, format!("{only} {shown}")]);
+    forms.retain(|form| !form.starts_with(';'));
+    forms
 }
 
 /// Columns of the longest source in the table.
@@ -187,8 +197,7 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
-        let ghost = [model.live.ghost, beside.map(|b| b.trial)].contains(&Some(trial.trial));
+        let ghost = laid_under(model).any(|under| under == trial.trial);
         let later = model.is_later(trial.trial);
         let mark = match (later, ghost) {
             (true, _) => "+",
