@@ -4,8 +4,8 @@ use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::recording::record::Record;
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, SearchStatus, SearchedParameter,
-    Verdict,
+    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, ProposalSource, QueuedPoint,
+    SearchStatus, SearchedParameter, Verdict,
 };
 use quadfrog_console::message::Msg;
 
@@ -187,6 +187,38 @@ fn live_says_that_a_parameter_is_fixed() {
     // The present proposal has another value, as a queued point has.
     console.record(fixed(90.0, 3));
     assert!(!console.screen(80, 24).contains("fixed"), "{}", console.screen(80, 24));
+}
+
+/// Regression: a line of the queue ended with two dots.
+#[test]
+fn a_queued_point_is_shown_whole_in_a_narrow_queue() {
+    let mut console = Console::ready();
+    let point = |trial| QueuedPoint {
+        trial,
+        source: ProposalSource::Rerun,
+        parent: Some(3),
+        parameters: vec![("f0".into(), 1.3), ("Fx".into(), 90.25), ("Fz".into(), 240.125)].into(),
+        gains: vec![("kp".into(), 450.0), ("kd".into(), 9.5), ("kd_joint".into(), 0.85)].into(),
+    };
+    let queue = (8..28).map(point).collect();
+    console.record(Record::Search(SearchStatus { budget: 20, queue, ..SearchStatus::default() }));
+    for (columns, rows) in [(60, 20), (80, 24)] {
+        console.press(&["N"]);
+        for trial in 8..28 {
+            let screen = console.screen(columns, rows);
+            let box_rows: Vec<&str> = screen.lines().filter_map(|line| line.split('│').nth(1)).collect();
+            let text = box_rows.join(" ").split_whitespace().collect::<Vec<_>>().join(" ");
+            let whole = format!("#{trial} re-run of #3 f0 1.3, Fx 90.25, Fz 240.125, kp 450, kd 9.5, kd_joint 0.85");
+            assert!(text.contains(&whole) && !text.contains(".. "), "{whole}:\n{screen}");
+            console.press(&["Down"]);
+        }
+        console.press(&["Esc"]);
+    }
+    console.record(Record::Search(SearchStatus::default()));
+    console.press(&["N"]);
+    let screen = console.screen(60, 20);
+    let text = screen.lines().filter_map(|line| line.split('│').nth(1)).collect::<Vec<_>>().join(" ");
+    assert_shows(&text.split_whitespace().collect::<Vec<_>>().join(" "), &["in the form of o those of the form."]);
 }
 
 /// Regression: the sign beside the number of a trial was not explained.

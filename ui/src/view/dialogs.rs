@@ -63,9 +63,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Dialog::Queue { selected } => {
             // Within the border and its margins.
             let width = usize::from(area.width.min(MAX_WIDTH).saturating_sub(4));
-            let lines = queue::lines(model, *selected, width);
-            // The selected line stays in sight.
-            let scroll = (*selected + 3).saturating_sub(usize::from(area.height));
+            let (lines, of_selected) = queue::lines(model, *selected, width);
+            // The selected point stays in sight.
+            let scroll = (of_selected.end + 2).saturating_sub(usize::from(area.height));
             render_lines(frame, area, model, ("Queue", MAX_WIDTH, "Up Down"), lines, scroll);
         }
         Dialog::Help { scroll } => {

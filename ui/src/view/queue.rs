@@ -1,15 +1,22 @@
 //! The queue: points that run before the sampler's.
 
+use std::ops::Range;
+
 use quadfrog::trial::QueuedPoint;
 use ratatui::text::Line;
 
-use super::draw::{span, truncate};
+use super::draw::span;
 use crate::action::Action;
 use crate::model::Model;
 use crate::theme::Role;
+use crate::wrap::{wrap, wrap_all};
 
-/// Returns a line for each queued point, `selected` marked, at most `width` columns wide; for an empty queue how to fill it.
-pub fn lines(model: &Model, selected: usize, width: usize) -> Vec<Line<'static>> {
+/// Columns before the words of a point.
+const INDENT: usize = 7;
+
+/// Returns the lines of the queued points, each wrapped to `width` columns, and the lines of the `selected` one, which is marked; for
+/// an empty queue how to fill it.
+pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>>, Range<usize>) {
     let theme = &model.theme;
     let queue = model.session.queue();
     if queue.is_empty() {
@@ -21,13 +28,21 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> Vec<Line<'static>>
             format!("{point} queues the values of the proposal; in the form of {form} those of the form."),
             format!("{rerun} in Trials queues the selected trial again."),
         ];
-        return texts.map(|text| Line::from(span(theme, Role::Quiet, truncate(&text, width)))).to_vec();
+        let lines = texts.map(|text| Line::from(span(theme, Role::Quiet, text)));
+        return (wrap_all(&lines, width, 0), 0..0);
     }
-    let line = |(index, point): (usize, &QueuedPoint)| {
+    let (mut lines, mut of_selected) = (Vec::new(), 0..0);
+    for (index, point) in queue.iter().enumerate() {
         let role = if index == selected { Role::Selected } else { Role::Text };
-        Line::from(span(theme, role, format!("{:<width$}", truncate(&described(point), width))))
-    };
-    queue.iter().enumerate().map(line).collect()
+        let begin = lines.len();
+        for row in wrap(&Line::from(described(point)), width, INDENT) {
+            lines.push(Line::from(span(theme, role, format!("{:<width$}", row.to_string()))));
+        }
+        if index == selected {
+            of_selected = begin..lines.len();
+        }
+    }
+    (lines, of_selected)
 }
 
 /// Returns a point in words: `#8  re-run of #3  f0 1.3, Fx 90, Fz 240`.
