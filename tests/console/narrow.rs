@@ -5,7 +5,7 @@ use quadfrog::recording::record::Record;
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, ProposalSource, QueuedPoint,
-    SearchStatus, SearchedParameter, Verdict,
+    REMOVED, SearchStatus, SearchedParameter, TrialRecord, Verdict,
 };
 use quadfrog_console::message::Msg;
 
@@ -219,6 +219,38 @@ fn a_queued_point_is_shown_whole_in_a_narrow_queue() {
     let screen = console.screen(60, 20);
     let text = screen.lines().filter_map(|line| line.split('│').nth(1)).collect::<Vec<_>>().join(" ");
     assert_shows(&text.split_whitespace().collect::<Vec<_>>().join(" "), &["in the form of o those of the form."]);
+}
+
+/// Regression: the header named a trial that was removed from the queue.
+#[test]
+fn the_header_of_a_finished_study_names_the_last_trial_that_ran() {
+    let mut console = Console::ready();
+    console.judged(2);
+    let removed = TrialRecord { cause: REMOVED.into(), value: None, ..trial(2, Some(Verdict::Void), None) };
+    console.record(Record::Trial(removed));
+    console.stage(ExperimentStage::Finished, 2);
+    let header = |columns| console.screen(columns, 24).lines().next().unwrap_or_default().to_owned();
+    assert_shows(&header(80), &["trial #1 "]);
+    assert_shows(&header(120), &["trial #1 "]);
+    console.stage(ExperimentStage::Proposed, 3);
+    assert_shows(&console.screen(80, 24), &["trial #3 "]);
+}
+
+/// Regression: view Override had dashes in place of the values of the trial that counted down or ran.
+#[test]
+fn the_values_of_the_running_trial_are_in_view_override() {
+    let mut console = Console::ready();
+    console.press(&["4"]);
+    console.stage(ExperimentStage::Running, 0);
+    console.mode(Mode::Countdown);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&screen, &["Trial #0 runs, source: sampler"]);
+        for (name, value) in [("f0  ", "1.250"), ("Fx  ", "75.00"), ("Fz  ", "250.0"), ("kp  ", "400.0")] {
+            assert_shows(&line_with(&screen, &format!("{name}  ")), &[value]);
+        }
+        assert_shows(&screen, &["The proposal cannot be changed now"]);
+    }
 }
 
 /// Regression: the sign beside the number of a trial was not explained.

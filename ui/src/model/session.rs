@@ -76,6 +76,20 @@ impl SessionModel {
         self.proposal.as_ref().filter(|proposal| proposal.trial == trial)
     }
 
+    /// The open proposal, or that of the running trial.
+    pub fn shown_proposal(&self) -> Option<&Proposal> {
+        let running = self.trial_in(ExperimentStage::Running);
+        let runs = || self.proposal.as_ref().filter(|proposal| Some(proposal.trial) == running);
+        self.open_proposal().or_else(runs)
+    }
+
+    /// The trial of the present stage for the header; when the study is finished, the last one that ran.
+    pub fn shown_trial(&self) -> Option<u32> {
+        let stage = self.stage?;
+        let ran = self.trials.records.values().rev().find(|trial| !trial.was_not_run()).map(|trial| trial.trial);
+        Some(ran.filter(|_| stage.stage == ExperimentStage::Finished).unwrap_or(stage.trial))
+    }
+
     /// Most jumps in a row of the running trial; 0 while none runs.
     pub fn jumps_in_a_row(&self) -> u32 {
         self.stage.map_or(0, |info| info.jumps)

@@ -15,7 +15,7 @@ use crate::wrap::wrap_all;
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
-    let proposal = model.session.open_proposal();
+    let proposal = model.session.shown_proposal();
     let value = |values: &[ProposedParameter], name: &str| values.iter().find(|p| p.name == *name).cloned();
     let parameters = &model.session.info.parameters;
     let line = |(index, info): (usize, &ParameterInfo)| {
@@ -33,7 +33,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let gains: Vec<Line> = model.session.info.gains.iter().enumerate().map(gain).collect();
     let title = match proposal {
         Some(proposal) => {
-            format!("Trial #{}, source: {}", proposal.trial, proposal.source.with_parent(proposal.parent))
+            let runs = if model.session.open_proposal().is_some() { "" } else { " runs" };
+            format!("Trial #{}{runs}, source: {}", proposal.trial, proposal.source.with_parent(proposal.parent))
         }
         None => "Parameters".to_owned(),
     };
@@ -84,7 +85,7 @@ fn search_state(model: &Model, info: &ParameterInfo) -> Option<Span<'static>> {
     match searched.fixed {
         Some(fixed) => {
             // A queued point has values of its own.
-            let proposal = model.session.open_proposal();
+            let proposal = model.session.shown_proposal();
             let value = proposal.and_then(|proposal| proposal.parameters.iter().find(|p| p.name == info.name));
             let has_it = value.is_none_or(|p| p.value == fixed.value);
             let when = if has_it { " " } else { " then " };

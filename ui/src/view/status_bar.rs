@@ -77,11 +77,11 @@ fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
     spans.push(Span::raw(session.task_name()));
     // Where the line can end, the least important part last.
     let mut ends = Vec::new();
-    if let Some(info) = model.session.stage {
+    if let Some(trial) = model.session.shown_trial() {
         let (finished, budget) = (model.session.counted(), model.session.budget());
         let (trial, counted) = match narrow {
-            true => (format!("  trial #{}", info.trial), format!("  {finished}/{budget}")),
-            false => (format!("   trial #{}", info.trial), format!("   {finished} of {budget} counted")),
+            true => (format!("  trial #{trial}"), format!("  {finished}/{budget}")),
+            false => (format!("   trial #{trial}"), format!("   {finished} of {budget} counted")),
         };
         for part in [trial, counted] {
             ends.push(spans.len());
