@@ -370,7 +370,10 @@ fn repeats_are_shown_as_k_of_n_with_their_spread() {
         point(vec![2, 4], 2, 0.6, Some(0.012), Some(0.96)),
     ]));
     let screen = console.screen(80, 24);
-    assert!(screen.contains("#2  2/2    0.600 ±0.012  96 %") && screen.contains("#0  2/3    0.410 ±0.050"), "{screen}");
+    assert!(
+        screen.contains("*#2    2/2    0.600 ±0.012 96 %") && screen.contains(" #0    2/3    0.410 ±0.050"),
+        "{screen}"
+    );
     console.press(&["3"]);
     let screen = console.screen(120, 40);
     assert!(screen.contains("2/2 landed  0.600 m ±0.012  leads, 96 %"), "{screen}");
