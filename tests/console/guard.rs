@@ -168,7 +168,7 @@ fn guard_of(console: Pid) -> Pid {
 /// Kills the console and returns the commands of the guard.
 fn kill_console(session: &mut Session, robot: &RecordingRobot) -> Vec<Vec<u8>> {
     session.signal(Signal::SIGKILL);
-    session.wait();
+    session.ended();
     robot.rest(robot.count())
 }
 
@@ -212,7 +212,7 @@ fn a_robot_whose_console_is_stopped_is_damped_until_it_continues() {
 fn a_robot_whose_console_ends_normally_receives_nothing_afterwards() {
     let (_folder, robot, mut session) = controlling();
     session.signal(Signal::SIGTERM);
-    assert!(session.wait().success());
+    assert!(session.ended().success());
     // Earlier commands may still be in the socket's queue.
     let rest = robot.rest(robot.count());
     assert!(rest.len() < 100, "{} datagrams after the end", rest.len());

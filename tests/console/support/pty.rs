@@ -7,6 +7,7 @@ use std::num::NonZeroU16;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -28,6 +29,7 @@ pub struct Session {
     writer: Option<Box<dyn Write + Send>>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<Mutex<Output>>,
+    reader: Option<JoinHandle<()>>,
     reading: Arc<AtomicBool>,
     closed: Arc<AtomicBool>,
     cell: (u16, u16),
@@ -94,16 +96,16 @@ impl Session {
         let parser = vt100::Parser::new(nonzero(rows), nonzero(columns), 0);
         let output = Arc::new(Mutex::new(Output { parser, bytes: Vec::new() }));
         let reading = Arc::new(AtomicBool::new(true));
-        let mut reader = pair.master.try_clone_reader().expect("a reader");
+        let mut terminal = pair.master.try_clone_reader().expect("a reader");
         let closed = Arc::new(AtomicBool::new(false));
         let (kept, go_on, over) = (output.clone(), reading.clone(), closed.clone());
-        std::thread::spawn(move || {
+        let reader = std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             loop {
                 while !go_on.load(Ordering::Acquire) {
                     std::thread::sleep(Duration::from_millis(5));
                 }
-                match reader.read(&mut buffer) {
+                match terminal.read(&mut buffer) {
                     // The reader keeps the terminal open; a hang-up needs its end.
                     Ok(0) | Err(_) => return,
                     Ok(_) if over.load(Ordering::Acquire) => return,
@@ -116,7 +118,8 @@ impl Session {
             }
         });
         let writer = Some(pair.master.take_writer().expect("a writer"));
-        Session { master: Some(pair.master), writer, child, output, reading, closed, cell: setup.cell }
+        let (master, reader) = (Some(pair.master), Some(reader));
+        Session { master, writer, child, output, reader, reading, closed, cell: setup.cell }
     }
 
     fn output(&self) -> MutexGuard<'_, Output> {
@@ -245,18 +248,27 @@ impl Session {
         self.child.try_wait().expect("asked")
     }
 
-    /// Waits until the program has ended.
-    pub fn wait(&mut self) -> ExitStatus {
+    /// Waits until the program has ended; what it started may still run.
+    pub fn ended(&mut self) -> ExitStatus {
         let begun = Instant::now();
         loop {
             if let Some(status) = self.finished() {
-                // Time for the reader to receive the rest.
-                std::thread::sleep(Duration::from_millis(100));
                 return status;
             }
             assert!(begun.elapsed() < PATIENCE, "the program did not end:\n{}", self.screen());
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+
+    /// Waits until the program has ended and all of its output is read.
+    pub fn wait(&mut self) -> ExitStatus {
+        let status = self.ended();
+        self.read(true);
+        // The reader ends when the last process in the terminal has.
+        if let Some(reader) = self.reader.take() {
+            self.wait_until("the terminal is closed", || reader.is_finished());
+        }
+        status
     }
 }
 
