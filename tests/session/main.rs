@@ -22,6 +22,7 @@ mod limits;
 mod measure;
 mod operator_lost;
 mod repeats;
+mod robot_study;
 mod search;
 mod storage;
 mod study_folder;

@@ -2,16 +2,13 @@
 //! arms, approves, accepts the suggested verdicts, and after a stop places the robot and arms again. Go1s, and with the feature
 //! `go2` Go2s.
 
-#[path = "support/go1.rs"]
-mod go1;
-
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use go1::{ANY_PORT, Lockstep, network};
+use crate::go1::{ANY_PORT, Lockstep, network};
 use quadfrog::config::Config;
 use quadfrog::engine::{self, EngineHandle, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
