@@ -222,6 +222,31 @@ fn typing_replaces_a_number_that_was_refused() {
     assert_eq!(bounds, [OperatorRequest::NarrowBounds { parameter: "Fx".into(), low: 50.0, high: 120.0 }]);
 }
 
+/// Regression: `12O` in the form of the overrides became 12 with Enter or `Q`, and the message about the letter went with the next digit.
+#[test]
+fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_character() {
+    let mut console = Console::ready();
+    let overridden = |value| [OperatorRequest::Override { parameter: "Fx".into(), value }];
+    assert_eq!(console.requests(&["o", "Down", "1", "2", "O", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again confirms 12"]);
+    assert_eq!(console.requests(&["Enter"]), overridden(12.0));
+    // The letter within the number, and a key without a meaning after it.
+    console.press(&["o", "Down", "1", "O", "2", "F5"]);
+    assert_shows(&console.screen(80, 24), &["`O` does not belong here", "Enter and Q ask again, Esc drops the number."]);
+    assert_eq!(console.requests(&["Q"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Q again queues 12"]);
+    let point = vec![("f0".into(), 1.25), ("Fx".into(), 12.0), ("Fz".into(), 250.0)];
+    assert_eq!(console.requests(&["Q"]), [OperatorRequest::Enqueue(point)]);
+    // Another row takes the number, too; so does Enter on a value that was not typed.
+    console.press(&["o", "Down", "1", "2", "O", "Down"]);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Down again takes 12"]);
+    assert_eq!(console.requests(&["Down", "x", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again confirms 250"]);
+    assert_eq!(console.requests(&["Enter"]), overridden(12.0));
+    // A number that is typed anew has no missing character.
+    assert_eq!(console.requests(&["o", "Down", "7", "O", "Backspace", "8", "Enter"]), overridden(8.0));
+}
+
 /// Regression: after a character that was not taken the last line promised that Enter confirms.
 #[test]
 fn enter_is_not_said_to_confirm_before_a_refused_character_is_acknowledged() {

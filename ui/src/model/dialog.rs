@@ -157,6 +157,16 @@ pub const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
 /// End of the message about a character that is not part of a place in a recording.
 pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, or best is typed";
 
+/// Whether a message of a form is about a character that was not taken. It stays until it is acknowledged: 1.5 would become 15 unseen.
+pub fn is_refused_character(message: &str) -> bool {
+    [NOT_OF_A_NUMBER, NOT_OF_A_PLACE].iter().any(|end| message.ends_with(end))
+}
+
+/// The answer to the key that would use a number without a character that was not taken.
+pub fn acknowledges_refused_character(key_again: &str) -> String {
+    format!("a character was not taken; {key_again}")
+}
+
 impl Purpose {
     /// The characters that its text may hold; none for any.
     pub fn characters(self) -> Option<&'static str> {
@@ -199,10 +209,14 @@ impl Dialog {
         Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces: false, problem: Some(problem) }
     }
 
-    /// Whether the field waits for an acknowledgement of a character that it has not taken: the next Enter confirms nothing.
+    /// Whether the field or the form waits for an acknowledgement of a character that it has not taken: the next Enter confirms
+    /// nothing.
     pub fn has_refused_character(&self) -> bool {
-        let Dialog::Field { problem: Some(problem), .. } = self else { return false };
-        [NOT_OF_A_NUMBER, NOT_OF_A_PLACE].iter().any(|end| problem.ends_with(end))
+        match self {
+            Dialog::Field { problem, .. } => problem.as_deref().is_some_and(is_refused_character),
+            Dialog::Override(form) => form.problem.as_deref().is_some_and(is_refused_character),
+            _ => false,
+        }
     }
 
     /// Whether a space is text here: not where a number is typed.

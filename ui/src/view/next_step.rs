@@ -291,6 +291,10 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
                 false => format!("Up Down PgUp PgDn scroll, {close}{arms}"),
             }
         }
+        Dialog::Override(form) if dialog.has_refused_character() => {
+            let esc = if form.typing.is_some() { "drops the number" } else { "cancels" };
+            format!("Enter and {} ask again, Esc {esc}.", key(Action::QueuePoint))
+        }
         Dialog::Override(form) if form.typing.is_none() => {
             let queue = key(Action::QueuePoint);
             format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels.")

@@ -3,6 +3,7 @@
 use crossterm::event::KeyCode;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::trial::six_digits;
 use tui_input::Input;
 
 use super::text_field::edit;
@@ -10,7 +11,9 @@ use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, NOT_OF_A_NUMBER, OverrideForm, OverrideRow};
+use crate::model::dialog::{
+    Dialog, NOT_OF_A_NUMBER, OverrideForm, OverrideRow, acknowledges_refused_character, is_refused_character,
+};
 use crate::update::request::{cancelled, does_nothing, reply, request};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
@@ -28,6 +31,17 @@ impl OverrideForm {
         if let Some(row) = self.rows.get_mut(self.selected) {
             row.value = (row.value + share * (row.high - row.low)).clamp(row.low, row.high);
         }
+    }
+
+    /// Reports, before a key uses the number, that a character of it was not taken; the key uses it when pressed again.
+    fn asks_about_refused_character(&mut self, key: Key, does: &str) -> bool {
+        if !self.problem.as_deref().is_some_and(is_refused_character) {
+            return false;
+        }
+        let shown = self.rows.get(self.selected).map(|row| six_digits(row.value)).unwrap_or_default();
+        let number = self.typing.as_ref().map_or(shown.as_str(), |input| input.value());
+        self.problem = Some(acknowledges_refused_character(&format!("{key} again {does} {number}")));
+        true
     }
 
     /// Takes the typed value over; false if it is refused, with the reason in `problem`.
@@ -72,6 +86,7 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             form.problem = None;
         }
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Enter if form.asks_about_refused_character(key, "confirms") => {}
         KeyCode::Enter if !form.take_typed() => {}
         KeyCode::Enter => {
             let changed = form.rows.iter().filter(|row| row.value != row.before);
@@ -84,12 +99,13 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
         }
         // Queues the form's point with the gains that differ from the configuration.
         _ if model.keymap.action(key) == Some(Action::QueuePoint) => {
-            if form.take_typed() {
+            if !form.asks_about_refused_character(key, "queues") && form.take_typed() {
                 let set = form.rows.iter().filter(|row| !row.gain || row.value != row.proposed);
                 let point = set.map(|row| (row.name.clone(), row.value)).collect();
                 return request(model, OperatorRequest::Enqueue(point));
             }
         }
+        KeyCode::Up | KeyCode::Down | KeyCode::Tab if form.asks_about_refused_character(key, "takes") => {}
         KeyCode::Up => form.select(form.selected.saturating_sub(1)),
         KeyCode::Down | KeyCode::Tab => form.select(form.selected + 1),
         KeyCode::Left if form.typing.is_none() => form.step(-0.01),
@@ -104,10 +120,14 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             if std::mem::take(&mut form.replaces) && (digit || deletes) {
                 form.typing = Some(Input::default());
             }
+            let refused = form.problem.take().filter(|text| is_refused_character(text));
             form.problem = match key.typed() {
-                _ if edits && edit(form.typing.get_or_insert_default(), key) => None,
+                // An emptied number has none that the missing character could have changed.
+                _ if edits && edit(form.typing.get_or_insert_default(), key) => {
+                    refused.filter(|_| form.typing.as_ref().is_some_and(|input| !input.value().is_empty()))
+                }
                 Some(c) => Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
-                None => Some(does_nothing(key, &form.keys(model))),
+                None => refused.or_else(|| Some(does_nothing(key, &form.keys(model)))),
             };
         }
     }

@@ -9,7 +9,9 @@ use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
-use crate::model::dialog::{Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question};
+use crate::model::dialog::{
+    Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question, acknowledges_refused_character, is_refused_character,
+};
 use crate::update::beside::chosen;
 use crate::update::rejudged;
 use crate::update::request::{cancelled, request};
@@ -25,9 +27,8 @@ pub(super) fn key(
     purpose: Purpose,
     (mut input, replaces, before): (Input, bool, Option<String>),
 ) -> Vec<Effect> {
-    // The message about a character that was not taken stays until it is acknowledged: 1.5 would become 15 unseen.
     let not_of_it = if purpose == Purpose::Seek { NOT_OF_A_PLACE } else { NOT_OF_A_NUMBER };
-    let mut problem = before.filter(|text| text.ends_with(not_of_it));
+    let mut problem = before.filter(|text| is_refused_character(text));
     let refused = key.typed().filter(|c| purpose.characters().is_some_and(|allowed| !allowed.contains(*c)));
     // The selection ends with the first key that edits; one that types or deletes takes the text with it. A number that was refused is
     // selected again.
@@ -45,10 +46,10 @@ pub(super) fn key(
         KeyCode::Enter if problem.is_some() => {
             problem = Some(match (input.value(), purpose) {
                 ("", Purpose::HandValue(trial)) if model.session.measured_objective_of(trial).is_some() => {
-                    "a character was not taken; Enter again goes back to the measured value".to_owned()
+                    acknowledges_refused_character("Enter again goes back to the measured value")
                 }
                 ("", _) => "nothing was typed yet; Esc cancels".to_owned(),
-                (number, _) => format!("a character was not taken; Enter again confirms {number}"),
+                (number, _) => acknowledges_refused_character(&format!("Enter again confirms {number}")),
             });
         }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
