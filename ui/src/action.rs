@@ -210,7 +210,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level"),
         row(A::Columns, "columns", &["x"], G::Tables, "choose the columns"),
         row(A::BestOnly, "best-only", &["b"], G::Tables, "only trials that were the best so far"),
-        row(A::Search, "search", &["/"], G::Tables, "Trials: jump to a number; Log: search"),
+        row(A::Search, "search", &["/"], G::Tables, "Trials: go to a trial by its number; Log: search the text"),
         row(A::Copy, "copy", &["y"], G::Tables, "copy the row to the terminal's clipboard"),
         row(A::Export, "export", &["e"], G::Tables, "write the table as CSV and Markdown beside the study"),
 
