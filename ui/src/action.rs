@@ -242,6 +242,6 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Mouse, "mouse", &["M"], G::Program, "mouse on or off: tabs, rows, wheel"),
         row(A::Redraw, "redraw", &["Ctrl-L"], G::Program, "draw the whole screen again"),
         row(A::Suspend, "suspend", &["Ctrl-Z"], G::Program, "suspend the program (only while the robot is not armed)"),
-        row(A::Quit, "quit", &["q"], G::Program, "quit; needs confirmation while the robot is armed"),
+        row(A::Quit, "quit", &["q"], G::Program, "quit; asks while the robot is armed or a trial waits for its verdict"),
     ]
 };
