@@ -589,7 +589,7 @@ fn a_robot_that_fell_is_not_called_stopped_after_the_verdict() {
     console.stage(ExperimentStage::Proposed, 1);
     assert_shows(&console.next_step(), &["FELL; check the robot, then k acknowledges: fell: "]);
     console.press(&["m"]);
-    assert_shows(&console.next_step(), &["FELL: Esc, then k acknowledges"]);
+    assert_shows(&console.next_step(), &["FELL: Enter keeps the note, Esc drops it; then k acknowledges."]);
 }
 
 /// Regression: a skipped proposal and a point removed from the queue were void trials in the table, its counts and the chart of J.

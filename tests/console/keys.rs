@@ -314,7 +314,7 @@ fn stop_over_a_form_says_that_its_values_are_not_applied_and_enter_acknowledges_
 #[test]
 fn every_open_dialog_says_first_that_the_robot_was_stopped() {
     for (mode, word) in [(Mode::Damped, "STOPPED"), (Mode::Fault, "FAULT")] {
-        for keys in [&["m"][..], &["?"], &[":"], &["P"], &["N"], &["R"], &["T"], &["2", "Enter"], &["q"]] {
+        for keys in [&["?"][..], &[":"], &["P"], &["N"], &["R"], &["T"], &["2", "Enter"], &["q"]] {
             let mut console = Console::review(Mode::Review, Verdict::Accept);
             console.press(keys);
             assert!(console.model.dialog.is_some(), "{keys:?}");

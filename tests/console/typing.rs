@@ -232,7 +232,10 @@ fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_char
     assert_eq!(console.requests(&["Enter"]), overridden(12.0));
     // The letter within the number, and a key without a meaning after it.
     console.press(&["o", "Down", "1", "O", "2", "F5"]);
-    assert_shows(&console.screen(80, 24), &["`O` does not belong here", "Enter and Q ask again, Esc drops the number."]);
+    assert_shows(
+        &console.screen(80, 24),
+        &["`O` does not belong here", "Enter and Q ask again, Esc drops the number."],
+    );
     assert_eq!(console.requests(&["Q"]), []);
     assert_shows(&console.screen(80, 24), &["a character was not taken; Q again queues 12"]);
     let point = vec![("f0".into(), 1.25), ("Fx".into(), 12.0), ("Fz".into(), 250.0)];
@@ -257,4 +260,28 @@ fn enter_is_not_said_to_confirm_before_a_refused_character_is_acknowledged() {
     assert_shows(&last(&mut console), &["Enter asks again, Esc cancels. Space is STOP."]);
     assert_eq!(console.requests(&["Enter"]), []);
     assert_shows(&last(&mut console), &["Enter confirms, Esc cancels. Space is STOP."]);
+}
+
+/// Regression: over a half-written note, which a STOP keeps open, the line advised the key that drops it.
+#[test]
+fn a_form_that_is_open_over_a_stop_says_first_how_it_is_kept() {
+    let last = |console: &Console| console.screen(80, 24).lines().last().unwrap_or_default().to_owned();
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["m", "o", "k"]);
+    assert_eq!(console.press(&["F12"]), [Effect::Stop]);
+    console.mode(Mode::Damped);
+    assert_eq!(last(&console), " STOPPED: Enter keeps the note, Esc drops it; then k acknowledges.");
+    let note = OperatorRequest::Note { trial: 0, text: "ok".into() };
+    assert_eq!(console.requests(&["Enter", "k"]), [note, OperatorRequest::Acknowledge]);
+    // Another person's STOP closes no form.
+    for (keys, step) in [
+        (&["=", "1"][..], "FAULT: Enter uses the value, Esc drops it; then k acknowledges."),
+        (&["=", "1", "m"], "FAULT: Enter asks again, Esc cancels; then k acknowledges."),
+        (&["2", "/"], "FAULT: Enter confirms, Esc cancels; then k acknowledges."),
+    ] {
+        let mut console = Console::review(Mode::Review, Verdict::Accept);
+        console.press(keys);
+        console.mode(Mode::Fault);
+        assert_eq!(last(&console).trim(), step, "{keys:?}");
+    }
 }

@@ -13,7 +13,7 @@ use crate::action::Action;
 use crate::legal::{legal, may_request, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Question};
+use crate::model::dialog::{Dialog, Purpose, Question};
 use crate::theme::Role;
 
 /// The most likely next step, and the others.
@@ -266,8 +266,26 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
     }
     let stopped = stopped(model);
     let acknowledge = model.keymap.key(Action::Acknowledge);
+    if let Some(ends) = ends_of_form(dialog) {
+        return NextStep { lead: format!("{stopped}: {ends}; then {acknowledge} acknowledges."), ..step };
+    }
     let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
     NextStep { lead: format!("{stopped}: {way}{acknowledge} acknowledges. {}", step.lead), ..step }
+}
+
+/// The two ends of a form with values of the operator, the one that keeps them first; none of another dialog.
+fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
+    Some(match dialog {
+        _ if dialog.has_refused_character() => "Enter asks again, Esc cancels",
+        Dialog::Override(_) => "Enter applies, Esc drops the values",
+        Dialog::Field { purpose: Purpose::Note(_), .. } => "Enter keeps the note, Esc drops it",
+        Dialog::Field { purpose: Purpose::HandValue(_), .. } => "Enter uses the value, Esc drops it",
+        Dialog::Field { purpose: Purpose::VoidReason { .. } | Purpose::ChangeVerdict { .. }, .. } => {
+            "Enter gives the verdict, Esc cancels"
+        }
+        Dialog::Field { .. } => "Enter confirms, Esc cancels",
+        _ => return None,
+    })
 }
 
 fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
