@@ -1,10 +1,10 @@
 //! Safety of people near the robot: the first command, approvals on hardware, the countdown, an observer's STOP.
 
-use crate::support::{Console, session};
+use crate::support::{Console, assert_shows, session};
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Snapshot, Tick};
-use quadfrog::trial::Backend;
+use quadfrog::trial::{Approval, Backend};
 use quadfrog_console::message::{Effect, Msg};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
@@ -120,5 +120,35 @@ fn a_forgotten_first_press_does_not_jump() {
         assert!(!console.screen(80, 24).contains("Jump?"), "{}", console.screen(80, 24));
         assert_eq!(console.requests(&["g", "Esc"]), [], "it begins the question anew");
         assert!(console.next_step().starts_with("Press g"), "{}", console.next_step());
+    }
+}
+
+/// Regression: with `--approve falls-only` on the simulator the line promised that the robot stands up, and it jumped.
+#[test]
+fn arming_says_that_a_robot_which_needs_no_approval_jumps() {
+    let armed = |approve: Approval, backend: Backend| {
+        let mut console = Console::proposed();
+        console.record(Record::Session(SessionInfo { approve, backend: Some(backend), ..session() }));
+        let arm = console.next_step();
+        console.press(&[":", "a", "r", "m", "Enter"]);
+        let question = console.screen(80, 24);
+        console.press(&["Esc"]);
+        console.mode(Mode::StandUp);
+        (arm, question, console.next_step())
+    };
+    for approve in [Approval::FallsOnly, Approval::Auto] {
+        let (arm, question, stands) = armed(approve, Backend::Simulator);
+        assert_eq!(arm, "Press A to arm: the robot stands up and jumps without a question.");
+        assert_shows(
+            &question,
+            &["The robot will stand up and jump without a question.", "arm: it stands up and jumps"],
+        );
+        assert_eq!(stands, "Standing up; the robot then jumps without a question.");
+    }
+    for (approve, backend) in [(Approval::Each, Backend::Simulator), (Approval::FallsOnly, Backend::Hardware)] {
+        let (arm, question, stands) = armed(approve, backend);
+        assert_eq!(arm, "Press A to arm: the robot stands up.");
+        assert_shows(&question, &["The robot will stand up. Is the area clear?"]);
+        assert_eq!(stands, "Standing up.");
     }
 }

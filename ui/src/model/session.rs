@@ -3,7 +3,7 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    ExperimentStage, ObjectiveRule, ParameterInfo, PointRecord, Proposal, ProposalInsight, ProposedParameter,
+    Approval, ExperimentStage, ObjectiveRule, ParameterInfo, PointRecord, Proposal, ProposalInsight, ProposedParameter,
     QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
 };
 
@@ -93,6 +93,11 @@ impl SessionModel {
     /// Most jumps in a row of the running trial; 0 while none runs.
     pub fn jumps_in_a_row(&self) -> u32 {
         self.stage.map_or(0, |info| info.jumps)
+    }
+
+    /// Whether a robot that stands jumps without an approval by the operator: on the simulator alone.
+    pub fn jumps_without_question(&self) -> bool {
+        self.info.approve != Approval::Each && !self.info.is_hardware()
     }
 
     /// The number of arming checks that forbid arming.

@@ -63,6 +63,9 @@ fn live(model: &Model) -> NextStep {
             let left = model.countdown_s.map_or(String::new(), |seconds| format!(" in {seconds} s"));
             step(format!("Jump{left}: any key cancels it."), model, &[])
         }
+        Mode::StandUp if session.jumps_without_question() && !finished => {
+            step("Standing up; the robot then jumps without a question.", model, &[sit_down])
+        }
         Mode::StandUp => step("Standing up.", model, &[sit_down]),
         Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[sit_down]),
         Mode::Jump => step("Jumping.", model, &[]),
@@ -130,10 +133,15 @@ fn live(model: &Model) -> NextStep {
         Mode::Disarmed => {
             let lead = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
-                0 if model.simulated_robot_lies() => {
-                    format!("Press {} to arm: the robot is turned upright and stands.", key(Action::Arm))
+                0 => {
+                    let stands = match (model.simulated_robot_lies(), session.jumps_without_question()) {
+                        (true, true) => "is turned upright, stands and jumps without a question",
+                        (true, false) => "is turned upright and stands",
+                        (false, true) => "stands up and jumps without a question",
+                        (false, false) => "stands up",
+                    };
+                    format!("Press {} to arm: the robot {stands}.", key(Action::Arm))
                 }
-                0 => format!("Press {} to arm: the robot stands up.", key(Action::Arm)),
                 1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
                 failing => {
                     let shows = key(Action::ArmingChecks);

@@ -49,7 +49,11 @@ pub fn take_control(model: &Model) -> Vec<Line<'static>> {
 pub fn arm(model: &Model, typed: usize) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let letters = model.session.arming_confirmation();
-    let mut lines = vec![Line::from("The robot will stand up. Is the area clear?"), Line::default()];
+    let effect = match model.session.jumps_without_question() {
+        true => "The robot will stand up and jump without a question.",
+        false => "The robot will stand up. Is the area clear?",
+    };
+    let mut lines = vec![Line::from(effect), Line::default()];
     if letters.len() == 1 {
         lines.push(answers(&model.theme, letters, "stand up"));
     } else {

@@ -241,8 +241,9 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
         Line::from(spans)
     };
     let judge = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void"), (Action::Rerun, "re-run")];
+    let arm = if model.session.jumps_without_question() { "arm: it stands up and jumps" } else { "arm: it stands up" };
     let lines = vec![
-        step("before", &[(Action::Arm, "arm: it stands up"), (Action::Override, "override"), (Action::Skip, "skip")]),
+        step("before", &[(Action::Arm, arm), (Action::Override, "override"), (Action::Skip, "skip")]),
         step("jump  ", &[(Action::Approve, "approve; again after 0.8 s: the robot jumps")]),
         step("after ", &[&judge[..], &[(Action::Undo, "undo")]].concat()),
         step(
