@@ -141,6 +141,16 @@ fn the_dialog_of_a_confirmation_says_how_many_repeats_it_takes() {
         &joined(&console.screen(80, 24)),
         &["to compare them takes 5 repeats", "does not count for the budget"],
     );
+    // Regression: the repeats make the last verdict final, and the screen had promised `u` until the next approval.
+    assert!(!joined(&console.screen(80, 24)).contains("then stays"));
+    console.press(&["Esc"]);
+    for verdict in [None, Some(Verdict::Accept)] {
+        console.record(Record::Trial(trial(5, verdict, None)));
+    }
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 6, can_undo: true, jumps: 0 }));
+    console.press(&["K"]);
+    let note = "the verdict of trial 5 then stays: u does not take it back any longer";
+    assert_shows(&joined(&console.screen(80, 24)), &["to compare them takes", note]);
 }
 
 /// Regression: the names of the numbers stood over no point, and a point was left out without a sign.

@@ -21,6 +21,7 @@ use tui_input::Input;
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::{arming, help, log, questions, queue};
+use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
 use crate::legal::palette;
 use crate::model::Model;
@@ -301,8 +302,15 @@ fn field(
                 Some(least) if least > 0 => format!("; to compare them takes {}", counted(least as u32, "repeat")),
                 _ => String::new(),
             };
+            let last = match model.session.undoable() {
+                Some(trial) => {
+                    let undo = model.keymap.key(Action::Undo);
+                    format!("; the verdict of trial {trial} then stays: {undo} does not take it back any longer")
+                }
+                None => String::new(),
+            };
             format!(
-                "the best points run again until one leads{needed}; each repeat is approved, and does not count for the budget"
+                "the best points run again until one leads{needed}; each repeat is approved, and does not count for the budget{last}"
             )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
