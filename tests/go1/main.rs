@@ -9,7 +9,11 @@ mod emulated;
 #[path = "../support/go1.rs"]
 mod go1;
 
+mod emulator_faults;
 mod faults;
 mod link;
 mod packets;
 mod random_faults;
+mod recent_count;
+mod remote;
+mod socket;

@@ -202,3 +202,24 @@ fn the_driver_writes_no_byte_by_its_place() {
     }
     assert!(read >= 7, "only {read} files");
 }
+
+/// The worked example of `docs/go1-wire.md`, section 3: the checksum of 608 zero bytes.
+#[test]
+fn the_documented_example() {
+    assert_eq!(CrcForm::Sealed.apply(0xE7CD_1C3B), 0xE50A_07A5);
+}
+
+/// The worked examples of `docs/go1-wire.md`, section 3, and `docs/go2-wire.md`, section 4.
+#[test]
+fn the_documented_examples() {
+    assert_eq!(crc(&[0; 4]), 0xC704_DD7B);
+    assert_eq!(crc(&[0xFE, 0xEF, 0xFF, 0]), 0x9BF0_26DF);
+    assert_eq!(crc(&[0; 608]), 0xE7CD_1C3B);
+    assert_eq!(crc(&[0; 808]), 0x4B5A_4880);
+    assert_eq!(crc(&[0; 1176]), 0x85F1_1EA6);
+}
+
+#[test]
+fn an_incomplete_word_is_not_covered() {
+    assert_eq!(crc(&[1, 2, 3, 4, 5, 6, 7]), crc(&[1, 2, 3, 4]));
+}

@@ -106,6 +106,11 @@ impl Link {
         &self.counter.status
     }
 
+    /// Returns the receive buffer. It begins with the newest datagram, also with an invalid one or that of a warm-up.
+    pub fn buffer(&self) -> &[u8] {
+        &self.buffer
+    }
+
     /// Whether a valid state has ever arrived.
     pub fn has_received(&self) -> bool {
         self.newest.is_some()
@@ -188,8 +193,11 @@ impl Link {
         LowState::parse(self.newest.as_ref()?.bytes()).ok()
     }
 
-    /// Counts the result of sending a command.
-    fn count_sent(&mut self, sent: std::io::Result<usize>) -> Result<(), i32> {
+    /// Counts the result of sending a command; to be called once per command that was sent over [`Link::socket`].
+    ///
+    /// # Errors
+    /// As [`Link::send`].
+    pub fn count_sent(&mut self, sent: std::io::Result<usize>) -> Result<(), i32> {
         let Err(error) = sent else {
             self.counter.status.sent += 1;
             self.refused = 0;
@@ -208,44 +216,4 @@ fn loopback_socket() -> std::io::Result<UdpSocket> {
     socket.connect(socket.local_addr()?)?;
     socket.set_nonblocking(true)?;
     Ok(socket)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::go1::packet::CrcForm;
-
-    const CLOCK: StateClock = StateClock { state_period_ms: 1, restart_ms: 100 };
-
-    /// (`tests/control/warm_up.rs` checks that a warm-up changes nothing.)
-    #[test]
-    fn a_warm_up_sends_an_invalid_datagram_to_itself() {
-        let address = (Ipv4Addr::LOCALHOST, 9).into();
-        let mut link = Link::open(&LinkOptions { address, local_port: 0, clock: CLOCK }).unwrap();
-        let command = LowCmd::braking(CrcForm::Plain);
-        assert_eq!(link.warm_up(command), None, "there is no state yet");
-        let received = &link.buffer[..command.bytes().len()];
-        assert_eq!(received[2..], command.bytes()[2..]);
-        assert!(LowCmd::parse(received, CrcForm::Plain).is_err());
-        assert_eq!(link.counter.status, LinkStatus::default());
-    }
-
-    /// No socket can be made to refuse every send, so the system's answer is injected.
-    #[test]
-    fn refused_sends_become_an_error_after_five() {
-        let address = (Ipv4Addr::LOCALHOST, 9).into();
-        let options = LinkOptions { address, local_port: 0, clock: CLOCK };
-        let mut link = Link::open(&options).unwrap();
-        let full = nix::errno::Errno::EAGAIN as i32;
-        let refused = || Err(std::io::Error::from_raw_os_error(full));
-        for _ in 0..2 {
-            for _ in 0..TOLERATED_REFUSALS {
-                assert_eq!(link.count_sent(refused()), Ok(()), "a full queue is tolerated for five milliseconds");
-            }
-            assert_eq!(link.count_sent(refused()), Err(full));
-            assert_eq!(link.count_sent(refused()), Err(full), "until one is sent");
-            assert_eq!(link.count_sent(Ok(614)), Ok(()), "the first one that is sent ends the error");
-        }
-        assert_eq!((link.counter.status.sent, link.counter.status.send_errors), (2, 14), "each is counted");
-    }
 }

@@ -56,9 +56,11 @@ pub enum InterfaceError {
 
 /// An interface of this machine that is up, with one of its addresses.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Interface {
-    name: String,
-    address: Ipv4Addr,
+pub struct NetworkInterface {
+    /// Its name, for example `eth0`.
+    pub name: String,
+    /// Its address.
+    pub address: Ipv4Addr,
 }
 
 impl Go2Network {
@@ -96,24 +98,32 @@ impl Go2Network {
     /// # Errors
     /// No interface or several fit, or they cannot be listed.
     pub fn address(&self) -> Result<Ipv4Addr, InterfaceError> {
-        choose(&interfaces()?, &self.interface, &self.subnet)
+        self.address_among(&interfaces()?)
+    }
+
+    /// Returns the address of the interface to the robot, as [`Go2Network::address`], among `all` interfaces of a machine.
+    ///
+    /// # Errors
+    /// No interface or several fit.
+    pub fn address_among(&self, all: &[NetworkInterface]) -> Result<Ipv4Addr, InterfaceError> {
+        choose(all, &self.interface, &self.subnet)
     }
 }
 
 /// Lists the interfaces that are up, each address of them once.
-fn interfaces() -> Result<Vec<Interface>, InterfaceError> {
+fn interfaces() -> Result<Vec<NetworkInterface>, InterfaceError> {
     let listed = getifaddrs().map_err(|errno| InterfaceError::Unlisted { reason: errno.to_string() })?;
     let up = listed.filter(|found| found.flags.contains(InterfaceFlags::IFF_UP));
     let addressed = up.filter_map(|found| {
         let address = found.address?.as_sockaddr_in()?.ip();
-        Some(Interface { name: found.interface_name, address })
+        Some(NetworkInterface { name: found.interface_name, address })
     });
     Ok(addressed.collect())
 }
 
 /// Chooses among `all` the interface with that name or address, or, without one, the only one in `subnet`.
-fn choose(all: &[Interface], wanted: &str, subnet: &str) -> Result<Ipv4Addr, InterfaceError> {
-    let list = |found: &[&Interface]| {
+fn choose(all: &[NetworkInterface], wanted: &str, subnet: &str) -> Result<Ipv4Addr, InterfaceError> {
+    let list = |found: &[&NetworkInterface]| {
         let named: Vec<_> = found.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
         if named.is_empty() { "none".to_owned() } else { named.join(", ") }
     };
@@ -127,7 +137,7 @@ fn choose(all: &[Interface], wanted: &str, subnet: &str) -> Result<Ipv4Addr, Int
             _ => Err(InterfaceError::Several { subnet: subnet.to_owned(), found: list(&found) }),
         };
     }
-    let is_wanted = |one: &&Interface| one.name == wanted || one.address.to_string() == wanted;
+    let is_wanted = |one: &&NetworkInterface| one.name == wanted || one.address.to_string() == wanted;
     let found: Vec<_> = all.iter().filter(is_wanted).collect();
     match found[..] {
         [one] => Ok(one.address),
@@ -136,52 +146,11 @@ fn choose(all: &[Interface], wanted: &str, subnet: &str) -> Result<Ipv4Addr, Int
     }
 }
 
-/// Parses ADDRESS/BITS to network and mask; none if it is not that, or not a network.
-fn parse_subnet(text: &str) -> Option<(u32, u32)> {
+/// Parses ADDRESS/BITS to network and mask; none if it is not that, or not a network. BITS is 1 to 32.
+pub fn parse_subnet(text: &str) -> Option<(u32, u32)> {
     let (address, bits) = text.split_once('/')?;
     let (address, bits): (Ipv4Addr, u32) = (address.parse().ok()?, bits.parse().ok()?);
     let mask = u32::MAX.checked_shl(32_u32.checked_sub(bits)?).unwrap_or(0);
     let network = u32::from(address);
     (bits > 0 && network & mask == network).then_some((network, mask))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn chosen(all: &[(&str, [u8; 4])], wanted: &str) -> Result<Ipv4Addr, String> {
-        let all: Vec<_> =
-            all.iter().map(|(name, address)| Interface { name: (*name).into(), address: (*address).into() }).collect();
-        choose(&all, wanted, "192.168.123.0/24").map_err(|error| error.to_string())
-    }
-
-    /// The machine's own interfaces differ from test to test, so the list is given.
-    #[test]
-    fn an_interface_is_used_only_where_it_is_the_only_one_that_fits() {
-        let wired = ("eth0", [192, 168, 123, 99]);
-        let wireless = ("wlan0", [192, 168, 123, 7]);
-        let lo = ("lo", [127, 0, 0, 1]);
-        assert_eq!(chosen(&[lo, wired], "").unwrap(), Ipv4Addr::from(wired.1));
-        let two = chosen(&[lo, wired, wireless], "").unwrap_err();
-        assert!(two.contains("eth0 192.168.123.99, wlan0 192.168.123.7") && two.contains("--interface"), "{two}");
-        let none = chosen(&[lo], "").unwrap_err();
-        assert!(none.contains("192.168.123.0/24") && none.contains("lo 127.0.0.1"), "{none}");
-        for wanted in ["eth0", "192.168.123.99"] {
-            assert_eq!(chosen(&[lo, wired, wireless], wanted).unwrap(), Ipv4Addr::from(wired.1));
-        }
-        let unknown = chosen(&[lo], "eth7").unwrap_err();
-        assert!(unknown.contains("eth7") && unknown.contains("lo 127.0.0.1"), "{unknown}");
-        let both = [wired, ("eth0", [10, 0, 0, 1])];
-        assert!(chosen(&both, "eth0").unwrap_err().contains("several addresses"));
-        assert_eq!(chosen(&both, "10.0.0.1").unwrap(), Ipv4Addr::new(10, 0, 0, 1));
-    }
-
-    #[test]
-    fn a_subnet_is_a_network_and_its_bits() {
-        for wrong in ["", "192.168.123.0", "192.168.123.1/24", "192.168.123.0/33", "192.168.123.0/0", "a/24"] {
-            assert_eq!(parse_subnet(wrong), None, "{wrong}");
-        }
-        assert_eq!(parse_subnet("192.168.123.0/24"), Some((0xC0A8_7B00, 0xFFFF_FF00)));
-        assert_eq!(parse_subnet("10.0.0.1/32"), Some((0x0A00_0001, u32::MAX)));
-    }
 }

@@ -217,38 +217,3 @@ pub fn help() -> String {
         |(word, operands, what): &(&str, FaultOperands, &str)| format!("  {:<26} {what}\n", usage(word, *operands));
     FAULTS.iter().map(line).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_fault_is_parsed_as_help_writes_it() {
-        for (word, operands, _) in &FAULTS {
-            let line = usage(word, *operands).replace("JOINT", "RL_thigh");
-            let value = |unit: &str| line.replace(unit, "3");
-            let parsed = match operands {
-                Number(_, unit, ..) | JointNumber(_, unit, ..) => value(unit).parse::<EmulatorFault>(),
-                Plain(_) | Joint(_) => line.parse(),
-                Buttons(_) => line.replace("BUTTONS", "L2+B").parse(),
-            };
-            assert!(parsed.is_ok(), "{line}: {parsed:?}");
-            assert!(help().contains(&usage(word, *operands)));
-        }
-        assert_eq!("hot fr_CALF 82".parse(), Ok(EmulatorFault::Hot { joint: 2, celsius: 82.0 }));
-    }
-
-    #[test]
-    fn an_invalid_fault_is_refused_with_the_valid_form() {
-        let message = |line: &str| line.parse::<EmulatorFault>().unwrap_err().to_string();
-        assert!(message("los 5").contains("\"los\"") && message("los 5").contains("loss"));
-        assert_eq!(message("loss"), "write it as: loss PERCENT");
-        assert_eq!(message("hot FR_calf"), "write it as: hot JOINT CELSIUS");
-        assert!(message("loss 101").contains("give 0 to 100 (PERCENT)"));
-        assert!(message("loss nan").contains("nan"));
-        assert!(message("stuck FR_knee").contains("FR_hip"));
-        assert!(message("clear now").contains("write it as: clear"));
-        assert!(message("").contains("known faults"));
-        assert!(message("remote L9").contains("L2") && message("clock-step far").contains("MS"));
-    }
-}

@@ -20,14 +20,3 @@ impl CrcForm {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The worked example of `docs/go1-wire.md`, section 3: the checksum of 608 zero bytes.
-    #[test]
-    fn the_documented_example() {
-        assert_eq!(CrcForm::Sealed.apply(0xE7CD_1C3B), 0xE50A_07A5);
-    }
-}

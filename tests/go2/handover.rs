@@ -1,0 +1,143 @@
+//! The handover from the robot's own controller: order of the requests, lost requests, failed releases, and each failure.
+
+use std::collections::VecDeque;
+
+use quadfrog::robot::go2::handover::{Handover, HandoverStatus, ServiceRequest};
+use quadfrog::robot::go2::message::{ResponseMessage, motion_switcher, sport};
+use quadfrog::robot::{JOINTS, Joints};
+
+const LYING: Joints = [0.35; JOINTS];
+const STANDING: Joints = [1.0; JOINTS];
+
+/// Services of a robot, with their faults.
+struct Services {
+    active: String,
+    /// First requests that are lost.
+    lost: u32,
+    /// Releases that change nothing.
+    deaf_releases: u32,
+    release_code: i32,
+    lies_down: bool,
+    position_rad: Option<Joints>,
+    /// Requests that arrived: service and function.
+    arrived: Vec<(&'static str, i64)>,
+    /// Released while the robot did not lie.
+    dropped: bool,
+}
+
+impl Services {
+    fn new(active: &str) -> Services {
+        Services {
+            active: active.to_owned(),
+            lost: 0,
+            deaf_releases: 0,
+            release_code: 0,
+            lies_down: true,
+            position_rad: Some(STANDING),
+            arrived: Vec::new(),
+            dropped: false,
+        }
+    }
+
+    fn serve(&mut self, request: &ServiceRequest) -> Option<ResponseMessage> {
+        if self.lost > 0 {
+            self.lost -= 1;
+            return None;
+        }
+        let ServiceRequest { service, message } = request;
+        self.arrived.push((service, message.api));
+        let mut response = ResponseMessage {
+            id: message.id,
+            api: message.api,
+            code: 0,
+            data: format!("{{\"form\":\"0\",\"name\":\"{}\"}}", self.active),
+            binary: Vec::new(),
+        };
+        match (*service, message.api) {
+            (sport::SERVICE, sport::STAND_DOWN) if self.lies_down => self.position_rad = Some(LYING),
+            (motion_switcher::SERVICE, motion_switcher::RELEASE_MODE) => {
+                self.dropped |= self.position_rad != Some(LYING);
+                response.code = self.release_code;
+                if self.deaf_releases > 0 {
+                    self.deaf_releases -= 1;
+                } else {
+                    self.active.clear();
+                }
+            }
+            _ => {}
+        }
+        Some(response)
+    }
+}
+
+/// Steps of 10 ms until the handover ends, with responses after 20 ms; returns its end and the time, ms.
+fn run(services: &mut Services) -> (HandoverStatus, u64) {
+    let mut handover = Handover::begin(0, &LYING, 1000);
+    let mut late: VecDeque<(u64, &str, ResponseMessage)> = VecDeque::new();
+    let mut ids = Vec::new();
+    for now_ms in (0..120_000).step_by(10) {
+        while late.front().is_some_and(|(at_ms, ..)| *at_ms <= now_ms) {
+            let (_, service, response) = late.pop_front().unwrap();
+            // A response to another program, and one of another function, come first.
+            handover.answer(now_ms, service, &ResponseMessage { id: 5, ..response.clone() });
+            handover.answer(now_ms, service, &ResponseMessage { api: 77, ..response.clone() });
+            handover.answer(now_ms, service, &response);
+        }
+        if let Some(request) = handover.advance(now_ms, services.position_rad.as_ref()) {
+            assert!(!ids.contains(&request.message.id), "an identity is used once");
+            ids.push(request.message.id);
+            late.extend(services.serve(&request).map(|response| (now_ms + 20, request.service, response)));
+        }
+        if let done @ (HandoverStatus::Done(_) | HandoverStatus::Failed(_)) = handover.status() {
+            return (done, now_ms);
+        }
+    }
+    panic!("no end in two minutes: {:?}", handover.status());
+}
+
+const CHECK: (&str, i64) = (motion_switcher::SERVICE, motion_switcher::CHECK_MODE);
+const RELEASE: (&str, i64) = (motion_switcher::SERVICE, motion_switcher::RELEASE_MODE);
+const DOWN: (&str, i64) = (sport::SERVICE, sport::STAND_DOWN);
+
+#[test]
+fn the_robot_lies_before_its_controller_is_released_and_the_release_is_verified() {
+    let mut services = Services::new("normal");
+    let (end, ms) = run(&mut services);
+    assert_eq!(end, HandoverStatus::Done(Some("normal".to_owned())));
+    assert_eq!(services.arrived, [CHECK, DOWN, RELEASE, CHECK]);
+    assert!(!services.dropped && (3000..4000).contains(&ms), "{ms} ms");
+}
+
+#[test]
+fn a_robot_without_a_controller_is_only_checked() {
+    let mut services = Services::new("");
+    assert_eq!(run(&mut services).0, HandoverStatus::Done(None));
+    assert_eq!(services.arrived, [CHECK]);
+}
+
+#[test]
+fn a_lost_request_is_repeated_and_a_failed_release_too() {
+    let mut services = Services { lost: 3, deaf_releases: 2, ..Services::new("mcf") };
+    assert_eq!(run(&mut services).0, HandoverStatus::Done(Some("mcf".to_owned())));
+    assert_eq!(services.arrived, [CHECK, DOWN, RELEASE, CHECK, DOWN, RELEASE, CHECK, DOWN, RELEASE, CHECK]);
+}
+
+#[test]
+fn each_cause_of_a_failure_is_named() {
+    let failure = |mut services: Services| match run(&mut services).0 {
+        HandoverStatus::Failed(error) if !services.dropped => error.to_string(),
+        other => panic!("{other:?}"),
+    };
+    let error = failure(Services { position_rad: None, ..Services::new("normal") });
+    assert!(error.contains("no state of the robot for 12000 ms"), "{error}");
+    let error = failure(Services { lost: u32::MAX, ..Services::new("normal") });
+    assert!(error.contains("motion_switcher has not answered request 1001 for 5000 ms"), "{error}");
+    let error = failure(Services { lies_down: false, ..Services::new("normal") });
+    assert!(error.contains("FR_hip is 0.65 rad from the lying pose"), "{error}");
+    let error = failure(Services { lies_down: false, position_rad: Some([f64::NAN; 12]), ..Services::new("ai") });
+    assert!(error.contains("inf rad from the lying pose"), "{error}");
+    let error = failure(Services { release_code: 7008, ..Services::new("normal") });
+    assert!(error.contains("request 1003 with the code 7008"), "{error}");
+    let error = failure(Services { deaf_releases: 9, ..Services::new("advanced") });
+    assert!(error.contains("\"advanced\" is still active after 3 releases"), "{error}");
+}
