@@ -198,3 +198,10 @@ fn joint_limits_are_the_intersection_of_the_urdf_and_the_official_sdk() {
     let (lying, min) = (settings.lying_position, settings.min_position);
     assert!((0..12).all(|i| lying[i] >= min[i]), "sitting down asks for nothing beyond a limit: {lying:?}");
 }
+
+#[test]
+fn the_table_has_the_order_of_the_findings() {
+    let findings = lying_still().cycle.readiness().findings;
+    assert_eq!(findings.failing().iter().next(), None, "these are findings of a tick");
+    assert_eq!(findings.0.map(|finding| finding.check), ArmingCheck::CONTROL);
+}

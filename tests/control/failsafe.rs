@@ -701,3 +701,13 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn measured_value_and_limit_never_print_alike() {
+    let fall = |measured_rad| FallCause::Pitch { measured_rad, allowed_rad: 1.0 }.to_string();
+    assert_eq!(fall(1.004), "pitch 1.004 rad exceeds 1.000 rad");
+    assert_eq!(fall(-1.000_04), "pitch -1.00004 rad exceeds 1.00000 rad");
+    let quiet = |measured_s| TrialInhibit::NotQuiet { measured_s, needed_s: 0.3 }.to_string();
+    assert_eq!(quiet(0.1), "all feet down and the trunk at rest for 0.1 s, a jump needs 0.3 s; wait");
+    assert_eq!(quiet(0.299), "all feet down and the trunk at rest for 0.299 s, a jump needs 0.300 s; wait");
+}

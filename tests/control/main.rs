@@ -15,6 +15,7 @@ mod robots;
 
 mod arming;
 mod consistency;
+mod covariance;
 mod cycle;
 mod estimator;
 mod estimator_late;
@@ -22,6 +23,7 @@ mod failsafe;
 mod force_signs;
 mod landing;
 mod landing_terms;
+mod mode;
 mod readiness;
 mod series;
 mod standing;

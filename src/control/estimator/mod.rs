@@ -7,7 +7,7 @@
 //! Yaw is that of the inertial unit, with its drift: no other sensor measures it.
 
 mod contact;
-mod covariance;
+pub mod covariance;
 mod filter;
 
 use nalgebra::Vector3;
