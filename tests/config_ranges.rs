@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use cores::on_all_cores;
-use quadfrog::config::{Config, ConfigError};
+use quadfrog::config::{Config, ConfigError, NumberRange, range_of, reference};
 use quadfrog::engine::{self, EngineError, Options, open_experiment};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
@@ -257,4 +257,76 @@ fn motors_without_a_limit_are_refused_on_hardware() {
 fn write_robot(folder: &Path, urdf: &str) {
     fs::write(folder.join("go1.urdf"), urdf).unwrap();
     fs::write(folder.join("robot.toml"), include_str!("../robots/go1/robot.toml")).unwrap();
+}
+
+/// The numbers of a value by their key with its tables; those of a list have the key of the list.
+fn numbers(value: &Value, key: &str) -> Vec<(String, f64)> {
+    match value {
+        Value::Integer(number) => vec![(key.to_owned(), *number as f64)],
+        Value::Float(number) => vec![(key.to_owned(), *number)],
+        Value::Table(table) => {
+            let dot = if key.is_empty() { "" } else { "." };
+            table.iter().flat_map(|(name, inner)| numbers(inner, &format!("{key}{dot}{name}"))).collect()
+        }
+        Value::Array(list) => list.iter().flat_map(|inner| numbers(inner, key)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Calls `check` with each number of the files: its name, its value, its range on every backend and on hardware.
+fn each(files: &[&str], check: impl Fn(&str, f64, &NumberRange, Option<&NumberRange>)) {
+    let reference = reference();
+    for name in files {
+        let file = reference.iter().find(|file| file.name == *name).unwrap();
+        let found = numbers(&Value::Table(file.text.parse().unwrap()), "");
+        assert!(!found.is_empty(), "{name}");
+        for (key, value) in found {
+            let name = format!("{name}: `{key}`");
+            let wide = range_of(file.name, &key).unwrap_or_else(|| panic!("{name} has no range"));
+            let (table, last) = key.rsplit_once('.').unwrap_or(("", &key));
+            let section = file.sections.iter().find(|section| section.table == table);
+            let known = section.and_then(|section| section.keys.iter().find(|known| known.name == last));
+            let known = known.unwrap_or_else(|| panic!("{name} is not in the reference"));
+            assert_eq!(known.range, Some(wide), "{name}");
+            check(&name, value, wide, known.hardware_range);
+        }
+    }
+}
+
+const FILES: [&str; 4] = ["control.toml", "safety.toml", "optimize.toml", "prior.toml"];
+
+#[test]
+fn every_number_of_the_defaults_has_a_range_and_is_inside() {
+    each(&FILES, |name, value, wide, narrow| {
+        assert!(wide.allows(value) && narrow.is_none_or(|narrow| narrow.allows(value)), "{name}");
+    });
+}
+
+/// No limit of a robot can be so large that it limits nothing.
+#[test]
+fn every_number_has_a_ceiling_on_hardware() {
+    each(&FILES, |name, _, wide, narrow| assert!(!narrow.unwrap_or(wide).allows(1e12), "{name}"));
+}
+
+#[test]
+fn a_range_for_hardware_is_part_of_the_range_for_every_backend() {
+    let grid: Vec<f64> = (-60..=60).flat_map(|i| [1.0, 2.5, 5.0].map(|d| d * 10_f64.powi(i / 5))).collect();
+    each(&FILES, |name, _, wide, narrow| {
+        let Some(narrow) = narrow else { return };
+        let outside = grid.iter().find(|value| narrow.allows(**value) && !wide.allows(**value));
+        assert_eq!(outside, None, "{name}");
+    });
+}
+
+#[test]
+fn every_number_of_the_simulator_has_a_range() {
+    each(&["simulator.toml"], |name, value, wide, _| assert!(wide.allows(value), "{name}"));
+}
+
+#[test]
+fn a_range_includes_its_ends_and_no_other_number() {
+    let range = range_of("control.toml", "tasks.forward.cutoff_lost_s").unwrap();
+    assert!([0.001, 0.1, 0.5].into_iter().all(|value| range.allows(value)));
+    assert!(![0.0009, 0.501, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().any(|value| range.allows(value)));
+    assert_eq!(range.text, "must be 0.001 to 0.5 s");
 }

@@ -121,23 +121,3 @@ fn collect(key: &str, value: &Value, found: &mut Vec<(String, f64)>) {
         Value::String(_) | Value::Boolean(_) | Value::Datetime(_) => {}
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_number_of_the_simulator_has_a_range() {
-        for (key, value) in numbers(&include_str!("../../config/simulator.toml").parse().unwrap(), "") {
-            assert!(range(SIMULATOR, &key).is_some_and(|range| range.allows(value)), "{key}");
-        }
-    }
-
-    #[test]
-    fn a_range_includes_its_ends_and_no_other_number() {
-        let range = within!(0.5, 2, "s");
-        assert!([0.5, 1.0, 2.0].into_iter().all(|value| range.allows(value)));
-        assert!(![0.49, 2.01, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].into_iter().any(|value| range.allows(value)));
-        assert_eq!(range.text, "must be 0.5 to 2 s");
-    }
-}
