@@ -1,11 +1,17 @@
 //! Real-time settings: each is requested by itself, a denied one is a value with its remedy, and the thread runs without it.
+//! Suspensions of the computer, and the lock that prevents them.
 
 use std::ops::ControlFlow;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use nix::time::{ClockId, clock_gettime};
 use quadfrog::config::Config;
+use quadfrog::realtime::clock::{SuspendWatch, suspended_ns};
 use quadfrog::realtime::scheduling::{RealtimeSetting, Scheduling};
+use quadfrog::realtime::sleep_lock::SleepLock;
+use quadfrog::realtime::system::cores;
 use quadfrog::realtime::{system, thread};
 use quadfrog::trial::Backend;
 
@@ -136,4 +142,62 @@ fn the_defaults_ask_for_a_robot_alone() {
     assert_eq!(config.scheduling(Backend::Simulator).priority, 0);
     let hardware = config.scheduling(Backend::Hardware);
     assert!(hardware.priority > 50 && hardware.lock_memory && hardware.core.is_none());
+}
+
+#[test]
+fn a_suspension_is_measured_once_and_slow_readings_are_none() {
+    const S: u64 = 1_000_000_000;
+    let mut watch = SuspendWatch::default();
+    // The upper bound is far too high: the reader was interrupted for 2 s.
+    assert_eq!(watch.observe([10 * S, 12 * S]), 0);
+    assert_eq!(watch.observe([10 * S, 10 * S + 100]), 0);
+    assert_eq!(watch.observe([8 * S, 10 * S + 100]), 0, "interrupted again");
+    assert_eq!(watch.observe([10 * S + S / 10, 13 * S]), 99, "suspended for 0.1 s, reported with the known bound");
+    assert_eq!(watch.observe([10 * S + S / 10, 10 * S + S / 10 + 100]), 0);
+    assert_eq!(watch.observe([70 * S, 70 * S + 100]), 59_899);
+    assert_eq!(watch.observe([70 * S, 70 * S + 100]), 0);
+}
+
+#[test]
+fn the_system_reports_bounds_that_do_not_fall() {
+    let mut watch = SuspendWatch::default();
+    for _ in 0..10_000 {
+        let bounds = suspended_ns().unwrap();
+        assert!(bounds[0] <= bounds[1]);
+        assert_eq!(watch.observe(bounds), 0);
+    }
+}
+
+/// A program in place of systemd-inhibit.
+fn program(folder: &Path, script: &str) -> PathBuf {
+    let path = folder.join("inhibit");
+    std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    path
+}
+
+#[test]
+fn a_lock_is_held_until_it_is_dropped_and_a_refused_one_is_reported_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let held = folder.path().join("held");
+    let script = format!("touch {0}; cat; rm {0}", held.display());
+    let mut lock = SleepLock::take(&program(folder.path(), &script)).unwrap();
+    while !held.exists() {
+        std::thread::yield_now();
+    }
+    assert!(!lock.lost());
+    drop(lock);
+    let mut refused = SleepLock::take(&program(folder.path(), "exit 1")).unwrap();
+    while !refused.lost() {
+        std::thread::yield_now();
+    }
+    assert!(!refused.lost());
+    assert!(SleepLock::take(&folder.path().join("none")).is_err());
+}
+
+#[test]
+fn lists_of_cores_are_read_as_the_kernel_writes_them() {
+    assert!(cores("\n").is_empty());
+    assert_eq!(cores("3\n"), [3]);
+    assert_eq!(cores("0,2-4,7\n"), [0, 2, 3, 4, 7]);
 }

@@ -60,36 +60,3 @@ impl Drop for SleepLock {
         let _ = self.process.wait();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A program in place of systemd-inhibit.
-    fn program(folder: &Path, script: &str) -> std::path::PathBuf {
-        use std::os::unix::fs::PermissionsExt;
-        let path = folder.join("inhibit");
-        std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
-        path
-    }
-
-    #[test]
-    fn a_lock_is_held_until_it_is_dropped_and_a_refused_one_is_reported_once() {
-        let folder = tempfile::tempdir().unwrap();
-        let held = folder.path().join("held");
-        let script = format!("touch {0}; cat; rm {0}", held.display());
-        let mut lock = SleepLock::take(&program(folder.path(), &script)).unwrap();
-        while !held.exists() {
-            std::thread::yield_now();
-        }
-        assert!(!lock.lost());
-        drop(lock);
-        let mut refused = SleepLock::take(&program(folder.path(), "exit 1")).unwrap();
-        while !refused.lost() {
-            std::thread::yield_now();
-        }
-        assert!(!refused.lost());
-        assert!(SleepLock::take(&folder.path().join("none")).is_err());
-    }
-}

@@ -84,8 +84,8 @@ fn has_capability(bit: u32) -> bool {
     effective.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).is_some_and(|set| set & (1 << bit) != 0)
 }
 
-/// Parses the kernel's list of cores, for example `0,2-4`.
-fn cores(list: &str) -> Vec<usize> {
+/// Parses the kernel's list of cores, for example `0,2-4`; empty for an empty list.
+pub fn cores(list: &str) -> Vec<usize> {
     let mut found = Vec::new();
     for part in list.trim().split(',').filter(|part| !part.is_empty()) {
         let (first, last) = part.split_once('-').unwrap_or((part, part));
@@ -94,16 +94,4 @@ fn cores(list: &str) -> Vec<usize> {
         }
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lists_of_cores_are_read_as_the_kernel_writes_them() {
-        assert!(cores("\n").is_empty());
-        assert_eq!(cores("3\n"), [3]);
-        assert_eq!(cores("0,2-4,7\n"), [0, 2, 3, 4, 7]);
-    }
 }
