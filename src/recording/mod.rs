@@ -26,7 +26,7 @@ pub mod session_files;
 pub mod session_writer;
 mod tick;
 pub mod timeline;
-mod topic;
+pub mod topic;
 mod trial_table;
 mod trials;
 mod wire;

@@ -25,5 +25,5 @@ mod study_tables;
 pub mod svg;
 pub mod table;
 pub mod text;
-mod ticks;
+pub mod ticks;
 pub mod trial_columns;

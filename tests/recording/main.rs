@@ -10,8 +10,11 @@ mod recording;
 mod skip;
 
 mod damage;
+mod difference;
 mod messages;
 mod python;
 mod recorder;
 mod roundtrip;
+mod schema;
 mod speed;
+mod topic;
