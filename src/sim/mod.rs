@@ -24,7 +24,7 @@ mod six;
 mod spatial;
 mod state;
 mod step;
-mod terrain;
+pub mod terrain;
 
 use nalgebra::Vector3;
 

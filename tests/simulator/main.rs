@@ -8,3 +8,4 @@ mod devices;
 mod flight;
 mod robots;
 mod terrain;
+mod terrain_search;

@@ -4,19 +4,23 @@ use nalgebra::{Vector2, Vector3};
 
 /// An upright box on the ground, with its velocity.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TerrainBlock {
+pub struct TerrainBlock {
+    /// Centre in the world's horizontal plane, m.
     pub center: Vector2<f64>,
+    /// Half of the two edges, m.
     pub half: Vector2<f64>,
     /// Direction of the box's x in the world.
     pub axis: Vector2<f64>,
+    /// Height of the top, m.
     pub top: f64,
     /// Coulomb coefficient of its surface.
     pub friction: f64,
+    /// Velocity in the world's horizontal plane, m/s.
     pub velocity: Vector2<f64>,
     /// Whether `velocity` is that of the end of this step.
-    pub moved: bool,
+    pub(super) moved: bool,
     /// Whether it is in the list of the blocks that move.
-    pub listed: bool,
+    pub(super) listed: bool,
 }
 
 impl TerrainBlock {
@@ -56,7 +60,8 @@ impl TerrainBlock {
         !separated(self, other) && !separated(other, self)
     }
 
-    /// Gap and normal between a sphere and this box, if nearer than `reach`.
+    /// Gap (m, negative inside) and normal (world, out of the box) between a sphere and this box, if nearer than `reach` (m).
+    /// `center` is that of the sphere, world, m; `radius` its radius, m.
     pub fn nearest(&self, center: &Vector3<f64>, radius: f64, reach: f64) -> Option<(f64, Vector3<f64>)> {
         let p = self.local(center.xy() - self.center);
         let outside = Vector2::new(p.x.abs() - self.half.x, p.y.abs() - self.half.y);

@@ -10,7 +10,7 @@ use crate::sim::config::BlocksConfig;
 
 /// A loose block in one step.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::sim) struct LooseBlock {
+pub struct LooseBlock {
     /// Index in the terrain.
     pub index: usize,
     mass_kg: f64,

@@ -9,9 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::config::{BlocksConfig, TerrainConfig, TerrainKind};
-use block::TerrainBlock;
 use grid::BlockGrid;
-pub(super) use loose_block::LooseBlock;
+
+pub use block::TerrainBlock;
+pub use loose_block::LooseBlock;
 
 /// Length and half of the width of a step: each extends to the far end, below all later ones, m.
 const FAR_M: f64 = 100.0;
@@ -21,18 +22,18 @@ const FRICTION_STREAM: u64 = 2;
 const BLOCK_FRICTION_STREAM: u64 = 3;
 
 /// Most contacts of one sphere at a time: a floor and a wall.
-pub(super) const MAX_TERRAIN_CONTACTS: usize = 2;
+pub const MAX_TERRAIN_CONTACTS: usize = 2;
 
 /// Contact of a sphere with the ground, or one within reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TerrainContact {
+pub struct TerrainContact {
     /// Distance between the surfaces, m; negative inside.
     pub gap: f64,
     /// Out of the ground, world.
     pub normal_world: Vector3<f64>,
     /// Coulomb coefficient.
     pub friction: f64,
-    /// Index of the loose block.
+    /// Index of the loose block; none for the plane, a step and a fixed block.
     pub block: Option<usize>,
 }
 
@@ -51,7 +52,7 @@ pub struct TerrainBox {
 
 /// The ground.
 #[derive(Debug, Clone)]
-pub(super) struct Terrain {
+pub struct Terrain {
     config: TerrainConfig,
     /// Normal of the plane through the world's origin.
     normal: Vector3<f64>,
@@ -66,6 +67,7 @@ pub(super) struct Terrain {
 }
 
 impl Terrain {
+    /// The ground of `config` in a trial with seed 0.
     pub fn new(config: &TerrainConfig) -> Terrain {
         let angle = if config.kind == TerrainKind::Slope { config.slope.angle_rad } else { 0.0 };
         let (sin, cos) = angle.sin_cos();
@@ -101,6 +103,7 @@ impl Terrain {
         self.blocks.clear();
         self.grid.clear();
         self.moving.clear();
+        self.highest = 0.0;
         self.friction = self.config.friction_of(seed);
         match self.config.kind {
             TerrainKind::Flat | TerrainKind::Slope => {}
@@ -113,11 +116,12 @@ impl Terrain {
                 block.friction = between(low, high, &mut random);
             }
         }
-        self.highest = self.blocks.iter().fold(0.0, |highest, block| block.top.max(highest));
     }
 
-    fn push(&mut self, block: TerrainBlock) {
+    /// Adds a step or block; allocates beyond the configured number.
+    pub fn push(&mut self, block: TerrainBlock) {
         self.grid.push(&block.center, block.extent_m());
+        self.highest = self.highest.max(block.top);
         self.blocks.push(block);
     }
 
@@ -215,7 +219,17 @@ impl Terrain {
         Vector3::new(v.x, v.y, 0.0)
     }
 
-    /// The steps or blocks.
+    /// Number of loose blocks that the robot touches or that move.
+    pub fn moving_count(&self) -> usize {
+        self.moving.len()
+    }
+
+    /// The steps or blocks, each at its index.
+    pub fn blocks(&self) -> &[TerrainBlock] {
+        &self.blocks
+    }
+
+    /// The steps or blocks, for displays.
     pub fn boxes(&self) -> impl Iterator<Item = TerrainBox> + '_ {
         self.blocks.iter().map(|b| TerrainBox {
             center: b.center.into(),
@@ -295,158 +309,4 @@ fn between(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
 /// Returns a uniform number in [0, 1) with 53 random bits.
 pub(super) fn unit_interval(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sim::SimConfig;
-
-    fn config(count: u32, area_m: [f64; 4], edge_m: [f64; 2], layers: u32) -> TerrainConfig {
-        let terrain = SimConfig::default().terrain;
-        let blocks = BlocksConfig { count, area_m: Some(area_m), edge_m, layers, loose: true, ..terrain.blocks };
-        TerrainConfig { kind: TerrainKind::Blocks, blocks, ..terrain }
-    }
-
-    /// Pushes a loose block with `impulse_world` (N s) in a step of 1 ms.
-    fn push_block(terrain: &mut Terrain, block: usize, impulse_world: &Vector3<f64>) {
-        let mut block = terrain.loose_block(block, 0.001);
-        block.push(impulse_world);
-        terrain.move_block(&block);
-    }
-
-    /// Sparse and dense, small and large blocks, far more cells than blocks and a single cell.
-    fn configs() -> [TerrainConfig; 5] {
-        [
-            TerrainConfig { kind: TerrainKind::Blocks, ..SimConfig::default().terrain },
-            config(3000, [-1.0, 20.0, -3.0, 3.0], [0.05, 0.5], 3),
-            config(200, [-60.0, 60.0, -0.1, 0.1], [0.01, 0.02], 2),
-            config(100, [0.5, 0.5, -0.5, 0.5], [0.3, 2.0], 10),
-            config(400, [-1.0, 1.0, -1.0, 1.0], [0.1, 0.1], 10),
-        ]
-    }
-
-    /// All blocks in order: the search without a grid.
-    fn linear(terrain: &Terrain, center: &Vector3<f64>, radius: f64, reach: f64) -> [Option<TerrainContact>; 2] {
-        let gap = terrain.plane_gap(center, radius);
-        let plane = TerrainContact { gap, normal_world: terrain.normal, friction: terrain.friction, block: None };
-        let (mut floor, mut wall) = ((gap < reach).then_some(plane), None);
-        for (i, block) in terrain.blocks.iter().enumerate() {
-            let Some((gap, normal_world)) = block.nearest(center, radius, reach) else { continue };
-            let loose = (terrain.config.blocks.loose).then_some(i);
-            let slot: &mut Option<TerrainContact> = if normal_world.z > 0.999 { &mut floor } else { &mut wall };
-            if slot.is_none_or(|other| gap < other.gap) {
-                *slot = Some(TerrainContact { gap, normal_world, friction: block.friction, block: loose });
-            }
-        }
-        [floor, wall]
-    }
-
-    /// Compares both searches at random points in and around the area; returns the number of contacts with blocks.
-    fn compare(terrain: &Terrain, random: &mut ChaCha8Rng) -> usize {
-        let [x_from, x_to, y_from, y_to] = terrain.config.blocks.area();
-        let mut contacts = 0;
-        for _ in 0..2000 {
-            let x = between(x_from - 1.0, x_to + 1.0, random);
-            let center = Vector3::new(x, between(y_from - 1.0, y_to + 1.0, random), between(-0.05, 0.4, random));
-            for (radius, reach) in [(0.02, 0.005), (0.0, 0.0), (0.02, 0.3), (0.1, 5.0)] {
-                let found = terrain.contacts(&center, radius, reach);
-                assert_eq!(found, linear(terrain, &center, radius, reach), "{center}, {radius}, {reach}");
-                contacts += found.iter().flatten().filter(|contact| contact.block.is_some()).count();
-            }
-        }
-        contacts
-    }
-
-    #[test]
-    fn the_grid_finds_the_contacts_of_a_search_over_all_blocks() {
-        for (number, config) in configs().into_iter().enumerate() {
-            let mut terrain = Terrain::new(&config);
-            let mut random = stream(7, 9);
-            for seed in 0..3 {
-                terrain.reset(seed);
-                assert!(terrain.blocks.len() >= 10, "configuration {number}: {} blocks", terrain.blocks.len());
-                compare(&terrain, &mut random);
-            }
-        }
-    }
-
-    #[test]
-    fn blocks_that_slide_stay_found_also_outside_the_area() {
-        let mut contacts = 0;
-        for config in &configs()[1..] {
-            let mut terrain = Terrain::new(config);
-            let mut random = stream(8, 9);
-            for _ in 0..20 {
-                for _ in 0..20 {
-                    let block = between(0.0, terrain.blocks.len() as f64, &mut random) as usize;
-                    let push = Vector3::new(between(-1.0, 1.0, &mut random), between(-1.0, 1.0, &mut random), 0.0);
-                    push_block(&mut terrain, block, &push);
-                }
-                for _ in 0..100 {
-                    terrain.advance(0.001);
-                }
-            }
-            contacts += compare(&terrain, &mut random);
-        }
-        assert!(contacts > 1000, "{contacts} contacts with blocks");
-    }
-
-    #[test]
-    fn blocks_are_laid_as_by_a_search_over_all_blocks() {
-        for config in configs() {
-            let BlocksConfig { count, layers, thickness_m, edge_m, .. } = config.blocks;
-            let [x_from, x_to, y_from, y_to] = config.blocks.area();
-            let mut random = stream(3, 0);
-            let mut uniform = |low: f64, high: f64| between(low, high, &mut random);
-            let mut blocks: Vec<TerrainBlock> = Vec::new();
-            for _ in 0..50 * count {
-                let center = Vector2::new(uniform(x_from, x_to), uniform(y_from, y_to));
-                let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
-                let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
-                let mut block = TerrainBlock::new(center, half, Vector2::new(cos, sin), 0.0);
-                let under = blocks.iter().filter(|other| block.overlaps(other)).fold(0.0_f64, |z, b| z.max(b.top));
-                block.top = under + thickness_m;
-                if blocks.len() < count as usize && block.top < (f64::from(layers) + 0.5) * thickness_m {
-                    blocks.push(block);
-                }
-                if blocks.len() == count as usize {
-                    break;
-                }
-            }
-            let mut terrain = Terrain::new(&config);
-            terrain.reset(3);
-            let places = |blocks: &[TerrainBlock]| blocks.iter().map(|b| (b.center, b.half, b.top)).collect::<Vec<_>>();
-            assert_eq!(places(&terrain.blocks), places(&blocks));
-        }
-    }
-
-    #[test]
-    fn of_two_equal_blocks_the_first_one_is_touched() {
-        let mut terrain = Terrain::new(&config(2, [-1.0, 1.0, -1.0, 1.0], [0.2, 0.2], 1));
-        terrain.reset(0);
-        let first = terrain.blocks[0];
-        terrain.blocks.clear();
-        terrain.grid.clear();
-        terrain.push(first);
-        terrain.push(TerrainBlock { friction: 0.1, ..first });
-        let above = Vector3::new(first.center.x, first.center.y, first.top + 0.02);
-        let floor = terrain.contacts(&above, 0.02, 0.01)[0].unwrap();
-        assert_eq!((floor.block, floor.friction), (Some(0), first.friction));
-    }
-
-    /// Regression: of more than 64 loose blocks, some were not slowed by the floor while a foot pushed another one.
-    #[test]
-    fn every_block_that_no_foot_pushes_comes_to_rest() {
-        let mut terrain = Terrain::new(&config(100, [-3.0, 3.0, -3.0, 3.0], [0.1, 0.2], 1));
-        push_block(&mut terrain, 3, &Vector3::new(0.06, 0.0, 0.0));
-        terrain.advance(0.001);
-        assert!(terrain.block_velocity(3).x > 0.5);
-        for _ in 0..1000 {
-            push_block(&mut terrain, 67, &Vector3::new(0.0, 0.0, -0.01));
-            terrain.advance(0.001);
-        }
-        assert_eq!(terrain.block_velocity(3), Vector3::zeros());
-        assert!(terrain.moving.is_empty());
-    }
 }
