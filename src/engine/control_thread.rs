@@ -18,11 +18,13 @@ use crate::robot::{CONTROL_PERIOD_S, JointCommand, Robot};
 
 /// Parts of the control thread.
 pub struct ControlThreadParts<'a, C> {
+    /// Settings of the controller, its limits and its failsafes.
     pub settings: &'a ControlSettings,
     /// Real-time settings that are requested of the system.
     pub scheduling: Scheduling,
     /// Receives the granted and denied real-time settings once, before the first tick.
     pub report: Sender<(Vec<RealtimeSetting>, Vec<DeniedSetting>)>,
+    /// Clock of the ticks' stages and of suspensions.
     pub clock: &'a C,
     /// Set when the thread is to end.
     pub closing: &'a AtomicBool,
@@ -53,7 +55,7 @@ pub fn run<C: Clock>(mut start: ControlThreadParts<C>, end: ControlPorts, robot:
 }
 
 /// Returns the time before a tick at which the caches are warmed; zero for a simulated robot, whose tick has no deadline.
-const fn lead(hardware: bool) -> Duration {
+pub const fn lead(hardware: bool) -> Duration {
     if hardware { WARM_UP_LEAD } else { Duration::ZERO }
 }
 
@@ -88,8 +90,12 @@ impl<C: Clock> PeriodicTask for Ticking<'_, C> {
     }
 }
 
-/// Ticks as `paced` calls them, then the damping with `wait` after each; what panicked is given back.
-fn drive<C: Clock>(
+/// As [`run`], but with the real-time settings and the pace of the caller: ticks as `paced` calls them, then the damping with
+/// `wait` after each command.
+///
+/// # Errors
+/// The panic of a tick, of `paced`, or of a clock that cannot be read; the robot has been damped by then.
+pub fn drive<C: Clock>(
     start: &mut ControlThreadParts<C>,
     end: ControlPorts,
     robot: &mut dyn Robot,
@@ -120,103 +126,4 @@ fn drive<C: Clock>(
         guard_heartbeat.release();
     }
     ended
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::Config;
-    use crate::realtime::channel::channels;
-    use crate::realtime::clock::SimulatedClock;
-    use crate::robot::description::RobotDescription;
-    use crate::robot::{Placement, RobotError, RobotState};
-    use crate::telemetry::Command;
-    use crate::trial::Backend;
-    use crate::trial::Task;
-
-    /// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
-    struct Brittle {
-        reads: u32,
-        warm_ups: u32,
-        sent: Vec<JointCommand>,
-    }
-
-    impl Robot for Brittle {
-        fn read(&mut self) -> Result<RobotState, RobotError> {
-            self.reads = self.reads.checked_sub(1).expect("an injected defect");
-            Ok(RobotState::default())
-        }
-        fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
-            self.sent.push(*command);
-            Ok(())
-        }
-        fn place(&mut self, _: &Placement) -> bool {
-            false
-        }
-        fn warm_up(&mut self) {
-            self.warm_ups = self.warm_ups.checked_sub(1).expect("an injected defect");
-        }
-    }
-
-    /// Returns the commands that a robot received and the number of waits, if `reads` ticks or `warm_ups` go well with it and the thread is
-    /// closed after `closes_after` waits.
-    fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], closes_after: u32) -> (Vec<JointCommand>, u32) {
-        let description = RobotDescription::embedded("go1").unwrap();
-        let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
-        let (control, mut session, console, _ticks) = channels();
-        console.heartbeat.beat();
-        if controlled {
-            session.commands.push(Command::TakeControl).unwrap();
-        }
-        let mut robot = Brittle { reads, warm_ups, sent: Vec::new() };
-        let closing = AtomicBool::new(closes_after == 0);
-        let mut start = ControlThreadParts {
-            settings: &settings,
-            scheduling: Scheduling::default(),
-            report: std::sync::mpsc::channel().0,
-            clock: &SimulatedClock,
-            closing: &closing,
-            hardware: true,
-            guard_heartbeat: None,
-        };
-        let mut ms = 0;
-        let unpaced = |ticking: &mut dyn PeriodicTask| {
-            while ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
-                ticking.warm_up();
-                ms += 1;
-            }
-            Ok(())
-        };
-        let mut waited = 0;
-        let ended = drive(&mut start, control, &mut robot, unpaced, || {
-            waited += 1;
-            closing.fetch_or(waited >= closes_after, Ordering::AcqRel);
-        });
-        assert_eq!(ended.is_err(), closes_after > 0, "a panic is not swallowed");
-        let is_damping = |command: &&JointCommand| **command == JointCommand::damping(settings.gate.damping_kd);
-        let last = robot.sent.iter().rev().take_while(is_damping).copied().collect();
-        (last, waited)
-    }
-
-    /// Regression: a panic in a tick ended the thread, and the motors kept the last torques.
-    #[test]
-    fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and_until_the_end() {
-        for until in [[20, u32::MAX], [u32::MAX, 20]] {
-            let (sent, waited) = damped(true, until, 1);
-            assert_eq!(waited, 500);
-            assert!(sent.len() >= 500, "{}", sent.len());
-            assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
-        }
-    }
-
-    #[test]
-    fn only_a_real_robot_has_a_cache_warm_up() {
-        assert_eq!((lead(true), lead(false)), (WARM_UP_LEAD, Duration::ZERO));
-    }
-
-    #[test]
-    fn the_last_word_to_a_robot_that_is_controlled_is_damping_and_to_another_there_is_none() {
-        assert_eq!(damped(true, [u32::MAX; 2], 0).1, 500, "an end in order, too");
-        assert_eq!(damped(false, [20, u32::MAX], 1), (Vec::new(), 0), "a robot that is only observed");
-    }
 }

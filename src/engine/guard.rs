@@ -92,12 +92,13 @@ pub struct GuardHeartbeat {
     answered: bool,
 }
 
-/// Orders to the guard.
+/// Orders to the guard; on the connection as JSON, after its length in bytes (two bytes, little endian).
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-struct GuardOrders {
+pub struct GuardOrders {
     /// Longest silence of the control thread, ms.
-    silence_ms: u16,
-    damping: DampingRoute,
+    pub silence_ms: u16,
+    /// Command that damps the robot, and its way to the robot.
+    pub damping: DampingRoute,
 }
 
 impl Guard {
@@ -125,11 +126,9 @@ impl Guard {
             .spawn()?;
         connection.write_all(&(orders.len() as u16).to_le_bytes())?;
         connection.write_all(&orders)?;
-        connection.set_nonblocking(true)?;
-        let findings = Arc::<GuardFindings>::default();
+        let heartbeat = GuardHeartbeat::new(connection)?;
         let allowed_silent_ms = settings.failsafe.guard_silent_ms;
-        let guard = Guard { process, findings: findings.clone(), allowed_silent_ms, gone: false };
-        Ok((guard, GuardHeartbeat::new(connection, findings)))
+        Ok((Guard { process, findings: heartbeat.findings.clone(), allowed_silent_ms, gone: false }, heartbeat))
     }
 
     /// Returns the present state. A guard whose connection is broken is killed so that it does not start damping.
@@ -158,8 +157,14 @@ impl Guard {
 }
 
 impl GuardHeartbeat {
-    fn new(connection: UnixStream, findings: Arc<GuardFindings>) -> GuardHeartbeat {
-        GuardHeartbeat { connection, findings, commanded: false, ticks: 0, silent_ms: 0, answered: false }
+    /// The heartbeats to a guard that starts at the other end of `connection`.
+    ///
+    /// # Errors
+    /// The connection cannot be made non-blocking.
+    pub fn new(connection: UnixStream) -> std::io::Result<GuardHeartbeat> {
+        connection.set_nonblocking(true)?;
+        let findings = Arc::default();
+        Ok(GuardHeartbeat { connection, findings, commanded: false, ticks: 0, silent_ms: 0, answered: false })
     }
 
     /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Returns the time for
@@ -232,11 +237,15 @@ pub enum GuardOutcome {
 /// The input is no guard's, its command does not damp, or the way to the robot cannot be opened.
 pub fn run_guard(connection: impl Read + Write + AsFd, socket: UdpSocket) -> Result<GuardOutcome, GuardError> {
     let mut watch = SuspendWatch::default();
-    guard_with(connection, socket, || suspended_ns().map_or(0, |bounds| watch.observe(bounds)))
+    run_guard_with(connection, socket, || suspended_ns().map_or(0, |bounds| watch.observe(bounds)))
 }
 
-/// As [`run_guard`]; `suspended_ms` returns the time for which the computer was suspended since its last call.
-fn guard_with(
+/// As [`run_guard`]; `suspended_ms` returns the time for which the computer was suspended since its last call, ms. It is called
+/// once after each wait for heartbeats.
+///
+/// # Errors
+/// As [`run_guard`].
+pub fn run_guard_with(
     mut connection: impl Read + Write + AsFd,
     socket: UdpSocket,
     mut suspended_ms: impl FnMut() -> u32,
@@ -295,141 +304,4 @@ fn read_orders(connection: &mut impl Read) -> Result<GuardOrders, GuardError> {
     let mut orders = vec![0; usize::from(u16::from_le_bytes(length))];
     connection.read_exact(&mut orders).map_err(|error| refused(&error))?;
     serde_json::from_slice(&orders).map_err(|error| refused(&error))
-}
-
-#[cfg(test)]
-mod tests {
-    use std::net::Ipv4Addr;
-
-    use super::*;
-    use crate::control::settings::ControlSettings;
-    use crate::robot::JointCommand;
-    use crate::robot::go1::convert::low_cmd;
-    use crate::robot::go1::packet::{CrcForm, LowCmd};
-
-    fn settings() -> ControlSettings {
-        let robot = crate::robot::description::RobotDescription::embedded("go1").unwrap();
-        let config = crate::config::Config::load(None).unwrap();
-        config.settings(&robot, crate::trial::Task::Forward, crate::trial::Backend::Hardware).unwrap()
-    }
-
-    fn heartbeat() -> (GuardHeartbeat, UnixStream) {
-        let (ours, theirs) = UnixStream::pair().unwrap();
-        ours.set_nonblocking(true).unwrap();
-        (GuardHeartbeat::new(ours, Arc::default()), theirs)
-    }
-
-    /// Regression: a stopped guard was noticed only when its pipe was full, after eleven minutes. In ticks, so that
-    /// the result does not depend on the machine's speed.
-    #[test]
-    fn a_guard_that_stops_answering_is_silent_within_a_hundred_ticks_and_one_that_answers_is_not() {
-        let allowed_ms = settings().failsafe.guard_silent_ms;
-        let (mut heartbeat, mut guard) = heartbeat();
-        let answer = |guard: &mut UnixStream| guard.write_all(&[ANSWER]).unwrap();
-        for _ in 0..1000 {
-            assert_eq!(heartbeat.count_tick(true), 0, "a guard that starts needs its time");
-        }
-        for _ in 0..1000 {
-            answer(&mut guard);
-            assert!(heartbeat.count_tick(true) < allowed_ms);
-        }
-        let mut ticks = 0;
-        while heartbeat.count_tick(true) <= allowed_ms {
-            ticks += 1;
-        }
-        assert!((60..100).contains(&ticks), "noticed after {ticks} ticks");
-        answer(&mut guard);
-        for _ in 0..HEARTBEAT_TICKS {
-            heartbeat.count_tick(true);
-        }
-        assert_eq!(heartbeat.count_tick(true), 0, "it answers again");
-        // Not dropped: a program that another test starts at this moment holds a copy until it runs.
-        guard.shutdown(std::net::Shutdown::Both).unwrap();
-        for _ in 0..HEARTBEAT_TICKS {
-            heartbeat.count_tick(true);
-        }
-        assert_eq!(heartbeat.count_tick(true), u32::MAX, "it is gone");
-    }
-
-    #[test]
-    fn a_guard_that_never_answers_is_silent_after_the_time_to_start() {
-        let (mut heartbeat, _guard) = heartbeat();
-        let ticks = (0..20_000).position(|_| heartbeat.count_tick(false) > 0).unwrap() as u32;
-        assert!(ticks.abs_diff(LONGEST_START_MS) < 20, "{ticks}");
-        // It stays silent, not gone: a stopped process may continue.
-        for _ in 0..20_000 {
-            assert_ne!(heartbeat.count_tick(false), u32::MAX);
-        }
-    }
-
-    fn command(kd: f64) -> Vec<u8> {
-        low_cmd(&JointCommand::damping(kd), CrcForm::Plain).unwrap().bytes().to_vec()
-    }
-
-    /// Bytes of the orders with their length.
-    fn orders(silence_ms: u16, damping: DampingRoute) -> Vec<u8> {
-        let orders = serde_json::to_vec(&GuardOrders { silence_ms, damping }).unwrap();
-        [&(orders.len() as u16).to_le_bytes()[..], &orders].concat()
-    }
-
-    /// Two sockets in place of the robot and of the connection to it.
-    fn robot() -> (UdpSocket, UdpSocket) {
-        let robot = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
-        robot.set_nonblocking(true).unwrap();
-        let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
-        socket.connect(robot.local_addr().unwrap()).unwrap();
-        (robot, socket)
-    }
-
-    /// Runs a guard with the heartbeats of a commanded robot, which it reads at two wakes; the computer was suspended for
-    /// `suspended_ms` before the second. Returns the number of datagrams until the message that the robot is left alone.
-    fn datagrams(suspended_ms: u32) -> usize {
-        let ((robot, socket), (mut ours, theirs)) = (robot(), UnixStream::pair().unwrap());
-        // One more than it reads at once.
-        let heartbeats = [COMMANDED; 65];
-        ours.write_all(&[&orders(60_000, DampingRoute::Go1 { command: command(3.0) })[..], &heartbeats].concat())
-            .unwrap();
-        let last = if suspended_ms > SUSPENDED_MS { 6 } else { 2 };
-        let mut wakes = 0;
-        let outcome = guard_with(theirs, socket, || {
-            wakes += 1;
-            if wakes == last {
-                ours.write_all(&[LEFT_ALONE]).unwrap();
-                ours.shutdown(std::net::Shutdown::Write).unwrap();
-            }
-            if wakes == 2 { suspended_ms } else { 0 }
-        });
-        assert_eq!(outcome.unwrap(), GuardOutcome::Quiet);
-        std::iter::from_fn(|| robot.recv(&mut [0; 2048]).ok()).count()
-    }
-
-    /// The heartbeat that wakes the guard was sent before the suspension: it damps until the next.
-    #[test]
-    fn a_guard_on_a_resumed_computer_damps_until_the_next_heartbeat() {
-        assert_eq!(datagrams(SUSPENDED_MS), 0);
-        assert_eq!(datagrams(SUSPENDED_MS + 1), 5);
-    }
-
-    #[test]
-    fn a_guard_refuses_a_datagram_that_does_not_damp() {
-        let guard = |input: &[u8]| {
-            let (mut ours, theirs) = UnixStream::pair().unwrap();
-            ours.write_all(input).unwrap();
-            drop(ours);
-            run_guard(theirs, robot().1)
-        };
-        let go2 = |command| DampingRoute::Go2 { command, domain: 1, address: Ipv4Addr::LOCALHOST, reliable: false };
-        for kd in [0.03, 0.9] {
-            let to_go2 = go2(crate::robot::go2::link::damping(kd).unwrap().bytes().to_vec());
-            for start in [orders(70, DampingRoute::Go1 { command: command(kd) }), orders(70, to_go2)] {
-                let error = guard(&start).unwrap_err().to_string();
-                assert!(error.contains("does not damp"), "{error}");
-            }
-        }
-        let braking = LowCmd::braking(CrcForm::Plain).bytes().to_vec();
-        assert!(guard(&orders(70, DampingRoute::Go1 { command: braking })).is_err());
-        assert!(guard(&orders(70, go2(command(3.0)))).is_err(), "a command of the other robot");
-        assert!(guard(b"\x02\x00{}").is_err(), "no orders");
-        assert!(guard(b"\xff\xff{").is_err(), "orders that end");
-    }
 }

@@ -1,6 +1,6 @@
 //! Starts the threads of a session from a checked configuration and gives a console its [`EngineHandle`].
 
-mod control_thread;
+pub mod control_thread;
 mod folder;
 mod ground;
 mod guard;
@@ -20,7 +20,7 @@ pub use folder::{
     study_files, utc_ns,
 };
 pub use ground::TrialGround;
-pub use guard::{GUARD, GuardError, GuardOutcome, run_guard};
+pub use guard::{GUARD, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};
 pub use observers::{
     FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, STOP_BY, SessionFacts, SessionNews,
     find_sessions,
@@ -31,6 +31,7 @@ pub use recording::create_recording;
 pub use rejudging::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging};
 pub use stored::{Opened, StoredStudy, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, open_experiment, open_study, session_info, study_name};
+pub use threads::{EngineThreads, ScheduledSettings};
 pub use verify::{TickDifference, Verification, VerifyError, attached_configuration, verify};
 
 use std::io::ErrorKind;
@@ -39,10 +40,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use self::folder::LockedFolder;
-use self::guard::{Guard, GuardHeartbeat};
+use self::guard::Guard;
 use self::recording::show_unrecorded;
 use self::study::open_without_prior;
-use self::threads::EngineThreads;
 use crate::control::settings::ControlSettings;
 use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;

@@ -91,38 +91,3 @@ impl Drop for EngineThreads {
         self.end_recorder();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::Config;
-    use crate::realtime::channel::channels;
-    use crate::recording::recorder::Recorder;
-    use crate::robot::description::RobotDescription;
-    use crate::sim::Simulator;
-    use crate::trial::Task;
-
-    /// An error after the start of the control thread leaves no thread behind: `start` drops what it has made.
-    #[test]
-    fn dropped_threads_have_ended() {
-        let (config, robot) = (Config::load(None).unwrap(), RobotDescription::embedded("go1").unwrap());
-        let settings = config.settings(&robot, Task::Forward, Backend::Simulator).unwrap();
-        let simulator = Simulator::new(&robot, &config.simulator).unwrap();
-        let options = Options::new(config, robot, Backend::Simulator, Task::Forward);
-        let (control_end, session_end, console_end, tick_end) = channels();
-        let (to_recorder, records) = channel();
-        let (to_session, _ticks) = channel();
-        let recorder = Recorder::spawn(tick_end, records, None, to_session).unwrap();
-        let mut threads = EngineThreads::of(recorder);
-        let (watch, closing) = (threads.recorder().unwrap().watch(), threads.closing.clone());
-        let clock = MonotonicClock::start();
-        let scheduled =
-            threads.spawn_control((Box::new(simulator), None), control_end, &options, &settings, clock).unwrap();
-        scheduled.recv().unwrap();
-        assert_eq!(Arc::strong_count(&closing), 3, "here, in the threads, in the control thread");
-        drop((to_recorder, session_end, console_end));
-        drop(threads);
-        assert_eq!(Arc::strong_count(&closing), 1);
-        assert_eq!(watch.get().error, None);
-    }
-}

@@ -1,0 +1,143 @@
+//! The threads of an engine: the control thread damps the robot at its end, also after a panic, and dropped threads have ended.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use crate::bench::shipped;
+use quadfrog::engine::control_thread::{ControlThreadParts, drive, lead};
+use quadfrog::engine::{EngineThreads, Options};
+use quadfrog::realtime::channel::channels;
+use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
+use quadfrog::realtime::scheduling::Scheduling;
+use quadfrog::realtime::thread::{PeriodicTask, TickStart, WARM_UP_LEAD};
+use quadfrog::recording::recorder::Recorder;
+use quadfrog::robot::{JointCommand, Placement, Robot, RobotError, RobotState};
+use quadfrog::sim::Simulator;
+use quadfrog::telemetry::Command;
+use quadfrog::trial::{Backend, Task};
+
+/// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
+struct Brittle {
+    reads: u32,
+    warm_ups: u32,
+    sent: Vec<JointCommand>,
+}
+
+impl Robot for Brittle {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        self.reads = self.reads.checked_sub(1).expect("an injected defect");
+        Ok(RobotState::default())
+    }
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.sent.push(*command);
+        Ok(())
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn warm_up(&mut self) {
+        self.warm_ups = self.warm_ups.checked_sub(1).expect("an injected defect");
+    }
+}
+
+/// Returns the commands that a robot received and the number of waits, if `reads` ticks or `warm_ups` go well with it and the thread is
+/// closed after `closes_after` waits.
+fn damped(controlled: bool, [reads, warm_ups]: [u32; 2], closes_after: u32) -> (Vec<JointCommand>, u32) {
+    let (_, _, settings) = shipped(Backend::Hardware);
+    let (control, mut session, console, _ticks) = channels();
+    console.heartbeat.beat();
+    if controlled {
+        session.commands.push(Command::TakeControl).unwrap();
+    }
+    let mut robot = Brittle { reads, warm_ups, sent: Vec::new() };
+    let closing = AtomicBool::new(closes_after == 0);
+    let mut start = ControlThreadParts {
+        settings: &settings,
+        scheduling: Scheduling::default(),
+        report: channel().0,
+        clock: &SimulatedClock,
+        closing: &closing,
+        hardware: true,
+        guard_heartbeat: None,
+    };
+    let mut ms = 0;
+    let unpaced = |ticking: &mut dyn PeriodicTask| {
+        while ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 }).is_continue() {
+            ticking.warm_up();
+            ms += 1;
+        }
+        Ok(())
+    };
+    let mut waited = 0;
+    let ended = drive(&mut start, control, &mut robot, unpaced, || {
+        waited += 1;
+        closing.fetch_or(waited >= closes_after, Ordering::AcqRel);
+    });
+    assert_eq!(ended.is_err(), closes_after > 0, "a panic is not swallowed");
+    let is_damping = |command: &&JointCommand| **command == JointCommand::damping(settings.gate.damping_kd);
+    let last = robot.sent.iter().rev().take_while(is_damping).copied().collect();
+    (last, waited)
+}
+
+/// Regression: a panic in a tick ended the thread, and the motors kept the last torques.
+#[test]
+fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and_until_the_end() {
+    for until in [[20, u32::MAX], [u32::MAX, 20]] {
+        let (sent, waited) = damped(true, until, 1);
+        assert_eq!(waited, 500);
+        assert!(sent.len() >= 500, "{}", sent.len());
+        assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
+    }
+}
+
+#[test]
+fn only_a_real_robot_has_a_cache_warm_up() {
+    assert_eq!((lead(true), lead(false)), (WARM_UP_LEAD, Duration::ZERO));
+}
+
+#[test]
+fn the_last_word_to_a_robot_that_is_controlled_is_damping_and_to_another_there_is_none() {
+    assert_eq!(damped(true, [u32::MAX; 2], 0).1, 500, "an end in order, too");
+    assert_eq!(damped(false, [20, u32::MAX], 1), (Vec::new(), 0), "a robot that is only observed");
+}
+
+/// A simulated robot that counts as running until its thread has dropped it.
+struct Watched(Simulator, #[expect(dead_code, reason = "its count is read")] Arc<()>);
+
+impl Robot for Watched {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        self.0.read()
+    }
+    fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.0.write(command)
+    }
+    fn place(&mut self, placement: &Placement) -> bool {
+        self.0.place(placement)
+    }
+}
+
+/// An error after the start of the control thread leaves no thread behind: `start` drops what it has made.
+#[test]
+fn dropped_threads_have_ended() {
+    let (config, robot, settings) = shipped(Backend::Simulator);
+    let running = Arc::new(());
+    let simulator = Watched(Simulator::new(&robot, &config.simulator).unwrap(), running.clone());
+    let options = Options::new(config, robot, Backend::Simulator, Task::Forward);
+    let (control_end, session_end, console_end, tick_end) = channels();
+    let (to_recorder, records) = channel();
+    let (to_session, _ticks) = channel();
+    let recorder = Recorder::spawn(tick_end, records, None, to_session).unwrap();
+    let mut threads = EngineThreads::of(recorder);
+    let watch = threads.recorder().unwrap().watch();
+    let clock = MonotonicClock::start();
+    let scheduled =
+        threads.spawn_control((Box::new(simulator), None), control_end, &options, &settings, clock).unwrap();
+    scheduled.recv().unwrap();
+    assert_eq!(Arc::strong_count(&running), 2, "here, in the control thread");
+    drop((to_recorder, session_end, console_end));
+    drop(threads);
+    assert_eq!(Arc::strong_count(&running), 1);
+    assert_eq!(watch.get().error, None);
+}
