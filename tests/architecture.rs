@@ -76,7 +76,7 @@ fn assert_none(violations: &[String], remedy: &str) {
     assert!(violations.is_empty(), "{} violations:\n  {}\n{remedy}", violations.len(), violations.join("\n  "));
 }
 
-/// The code of a file as words: identifiers, `::`, and single characters; test modules and attributes left out.
+/// The code of a file as words: identifiers, `::`, and single characters; attributes left out.
 fn words(file: &Path) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap();
     let tokens: TokenStream = text.parse().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -87,30 +87,16 @@ fn words(file: &Path) -> Vec<String> {
 
 fn flatten(tokens: TokenStream, words: &mut Vec<String>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
-    let mut test = false;
     let mut at = 0;
     while let Some(token) = tokens.get(at) {
         match token {
             TokenTree::Punct(hash) if hash.as_char() == '#' => {
                 // `#[...]` or `#![...]`
                 let next = at + 1 + usize::from(matches!(&tokens.get(at + 1), Some(TokenTree::Punct(_))));
-                if let Some(TokenTree::Group(attribute)) = tokens.get(next) {
-                    test |= attribute.stream().to_string().replace(' ', "") == "cfg(test)";
+                if let Some(TokenTree::Group(_)) = tokens.get(next) {
                     at = next + 1;
                     continue;
                 }
-            }
-            TokenTree::Ident(name) if test => {
-                // The item under `#[cfg(test)]` ends with its braces or a semicolon.
-                let ends = |token: &TokenTree| match token {
-                    TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
-                    TokenTree::Punct(punct) => punct.as_char() == ';',
-                    _ => false,
-                };
-                let length = tokens[at..].iter().position(ends).unwrap_or_else(|| panic!("no end after {name}"));
-                at += length + 1;
-                test = false;
-                continue;
             }
             TokenTree::Ident(name) => words.push(name.to_string()),
             TokenTree::Punct(punct) => words.push(punct.as_char().to_string()),
@@ -408,6 +394,32 @@ fn names_of_public_types_are_unique() {
         &violations,
         "Rename all but one; where they are one idea at two borders, put the border into the name.",
     );
+}
+
+/// The libraries are not compiled for tests (`test = false` in their manifests), so a test in their sources would not run.
+#[test]
+fn no_source_of_a_library_has_a_test() {
+    let mut violations = Vec::new();
+    for file in ["src", "ui/src"].into_iter().flat_map(|folder| files(&root().join(folder), "rs")) {
+        let text = fs::read_to_string(&file).unwrap();
+        for (number, line) in (1..).zip(text.lines().map(str::trim)) {
+            let attribute = line.strip_prefix("#[").or_else(|| line.strip_prefix("#![")).unwrap_or_default();
+            // Before a text in quotes.
+            let code = attribute.split('"').next().unwrap_or_default();
+            if code.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == "test") {
+                violations.push(format!("{}:{number}: {line}", short(&file)));
+            }
+        }
+    }
+    assert_none(&violations, "Test it through the public interface, in the program of its area in tests/.");
+    for manifest in ["Cargo.toml", "ui/Cargo.toml"] {
+        let text = fs::read_to_string(root().join(manifest)).unwrap();
+        let library = text.split("[lib]").nth(1).and_then(|rest| rest.split("\n[").next()).unwrap_or_default();
+        assert!(
+            library.lines().any(|line| line.starts_with("test = false")),
+            "{manifest}: [lib] has no `test = false`"
+        );
+    }
 }
 
 #[test]
