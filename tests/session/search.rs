@@ -196,6 +196,30 @@ fn a_fixed_parameter_has_its_value_for_so_many_trials_and_the_others_are_still_p
     assert_ne!(value(&experiment, "Fx"), 60.0);
 }
 
+/// Regression: a trial that was queued with the fixed value used up none, against the manual; the fix held for more trials than asked.
+#[test]
+fn a_queued_trial_and_a_re_run_with_the_fixed_value_use_up_one() {
+    let mut experiment = experiment(20);
+    experiment.fix("Fx", 60.0, 4).unwrap();
+    let left = |experiment: &mut Experiment, trials: u32| {
+        assert_eq!(search(experiment).parameters[1].fixed, Some(FixedParameter { value: 60.0, trials }));
+    };
+    experiment.enqueue(&[("Fx".into(), 60.0)]).unwrap();
+    accept(&mut experiment);
+    left(&mut experiment, 3);
+    // The sampler proposes what was not queued.
+    experiment.enqueue(&[("f0".into(), 1.0)]).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 60.0);
+    left(&mut experiment, 2);
+    run(&mut experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Void, true).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 60.0);
+    left(&mut experiment, 1);
+    experiment.enqueue(&[("Fx".into(), 80.0)]).unwrap();
+    accept(&mut experiment);
+    left(&mut experiment, 1);
+}
+
 #[test]
 fn a_fixed_parameter_can_be_freed_and_overridden_and_leaves_queued_points_alone() {
     let mut experiment = experiment(20);

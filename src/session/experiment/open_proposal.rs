@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::attributes::Origin;
+use super::attributes::{self, Origin};
 use super::changes::Changes;
 use super::plan::{RequestRefusal, must_be};
 use crate::optimize::ask::{Prediction, SamplerKind};
@@ -55,12 +55,15 @@ impl ApprovedProposal {
 }
 
 impl OpenProposal {
-    /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with values
-    /// of its own. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the
+    /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with other values
+    /// of its own, or repeats a point to confirm the best. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the
     /// configured ones; `revision` must be one that no earlier proposal had.
     pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> OpenProposal {
-        let queued = study.waiting().next().map(Trial::fixed).unwrap_or_default();
-        let fixed: Vec<_> = fixed.iter().filter(|(name, _)| queued.iter().all(|(n, _)| n != name)).cloned().collect();
+        let next = study.waiting().next();
+        let queued = next.map(Trial::fixed).unwrap_or_default();
+        let confirms = next.is_some_and(attributes::confirms);
+        let agrees = |(name, value): &&(String, f64)| queued.iter().all(|(n, own)| n != name || own == value);
+        let fixed: Vec<_> = fixed.iter().filter(|_| !confirms).filter(agrees).cloned().collect();
         let draft = study.draft_with(&fixed);
         let mut open = OpenProposal {
             only_with_verdict: draft.enqueued && !in_study,

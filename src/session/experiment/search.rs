@@ -13,8 +13,9 @@ use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, six_digits};
 
 impl FixedFrom {
-    /// Returns the number of trials for which `name` is still fixed. A trial uses one up that has the fixed value for that reason,
-    /// also where the operator has changed its other parameters, unless it is void.
+    /// Returns the number of trials for which `name` is still fixed. A trial uses one up that has the fixed value, also
+    /// one that was queued with it or whose other parameters the operator has changed, unless it is void or repeats a point to confirm
+    /// the best.
     fn trials_left(&self, name: &str, trials: &[Trial]) -> u32 {
         let ran = |trial: &&Trial| {
             trial.number >= self.from

@@ -65,7 +65,7 @@ impl Experiment {
     }
 
     /// Fixes a parameter for the next `trials` trials that count; the other parameters are proposed for that value, and may be
-    /// changed by the operator. A point that was queued with a value of its own keeps it and uses up none of them, and so does a
+    /// changed by the operator. A point that was queued with another value keeps it and uses up none of them, and so does a
     /// proposal in which the operator has changed this parameter. Replaces an earlier fix of the same parameter.
     /// Refused when a trial is under way, there is no such parameter, the value is outside its bounds, nothing would be
     /// left to search.
