@@ -16,14 +16,16 @@ use crate::recording::timeline::Timeline;
 use crate::robot::description::RobotDescription;
 use crate::session::rejudge::{Judgement, rejudge, row_of_repeat};
 use crate::telemetry::{Mode, Tick};
-use crate::trial::{Backend, JumpParameters, ObjectiveRule, TrialRecord};
+use crate::trial::{Backend, JumpParameters, ObjectiveRule, TrialRecord, Verdict};
 
 /// A trial with its old and its new judgement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RejudgedTrial {
     /// Its number.
     pub trial: u32,
-    /// The rules' result as recorded.
+    /// The verdict in force in the recording; none where the trial has none yet.
+    pub judged: Option<Verdict>,
+    /// The rules' result as recorded, which the operator's verdict may differ from.
     pub old: Judgement,
     /// The rules' result by the other configuration.
     pub new: Judgement,
@@ -203,7 +205,7 @@ impl Rejudging {
             repeats => Judgement::unknown(format!("{} of its {repeats} rollouts are recorded", judged.len())),
         };
         let estimate = self.estimator.is_some().then_some(estimate);
-        Some(RejudgedTrial { trial: row.trial, old: Judgement::of(row), new, estimate })
+        Some(RejudgedTrial { trial: row.trial, judged: row.verdict, old: Judgement::of(row), new, estimate })
     }
 }
 

@@ -54,9 +54,10 @@ fn the_same_configuration_gives_the_same_judgement_and_leaves_the_file() {
         assert_same(&row["new"], &row["old"], "");
         assert!(row["old"]["value"].is_f64());
         assert_eq!(row["difference"], 0.0);
+        assert_eq!(row["verdict"], row["old"]["verdict"], "a study without an operator takes the suggestions");
     }
     let table = program.text(&["rejudge", study.to_str().unwrap(), "--config", study.join("config").to_str().unwrap()]);
-    assert_shows(&table, &["old J", "new J", "difference", "0 of 6 trials change"]);
+    assert_shows(&table, &["old J", "new J", "difference", "0 of 6 suggestions change"]);
     assert_eq!(fs::read(study.join("session.mcap")).unwrap(), before, "the file is not changed");
 }
 

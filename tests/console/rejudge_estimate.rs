@@ -78,7 +78,7 @@ fn the_same_configuration_gives_the_same_judgement_of_every_trial() {
         assert_eq!(row["estimate"], Value::Null, "nothing is recomputed");
     }
     let text = program.text(&["rejudge", study.to_str().unwrap(), "--config", "config"]);
-    assert_shows(&text, &["0 of 3 trials change"]);
+    assert_shows(&text, &["0 of 3 suggestions change"]);
     assert_eq!(fs::read(study.join("session.mcap")).unwrap(), before, "the file is not changed");
 }
 

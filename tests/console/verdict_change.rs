@@ -70,6 +70,11 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     let exported = quadfrog(folder.path(), &["study", "export", study.to_str().expect("a path")]);
     let row = exported.lines().find(|line| line.contains("it lay on its back"));
     assert!(row.is_some_and(|row| row.contains("fall")), "{exported}");
+    // Regression: the recorded suggestion was called the old verdict.
+    let judged_again = quadfrog(folder.path(), &["rejudge", study.to_str().expect("a path")]);
+    let columns: Vec<&str> = judged_again.lines().nth(1).expect("trial 0").split_whitespace().collect();
+    assert_eq!((columns[1], columns[3], columns[5]), ("fall", "accept", "accept"), "{judged_again}");
+    assert!(judged_again.contains("0 of 1 suggestions change"), "{judged_again}");
 }
 
 /// Regression: a session that ended in the review made the measured jump void, and the value by hand was lost with it.

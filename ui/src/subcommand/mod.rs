@@ -70,7 +70,7 @@ enum Subcommands {
     Attach(attach::AttachArguments),
     /// List the sessions that run on this machine under this user
     Sessions,
-    /// Judge recorded trials by another configuration, old beside new
+    /// Judge recorded trials by another configuration: suggestions, old beside new
     Rejudge(rejudge::RejudgeArguments),
     /// Export the signals of a recording as CSV, JSON or Parquet
     Export(export::ExportArguments),

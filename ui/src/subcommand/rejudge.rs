@@ -1,4 +1,5 @@
-//! `quadfrog rejudge`: estimate, fall detection and objective of another configuration on recorded ticks, old beside new.
+//! `quadfrog rejudge`: estimate, fall detection and objective of another configuration on recorded ticks: the recorded suggestion
+//! beside the new one, and the verdict in force.
 
 use std::path::PathBuf;
 
@@ -59,22 +60,24 @@ fn name(verdict: Option<Verdict>) -> &'static str {
 
 fn print(results: &[RejudgedTrial], unit: &str) {
     put_line!(
-        "{:>5}  {:>10}  {:<7}  {:>10}  {:<7}  {:>11}  cause",
+        "{:>5}  {:<7}  {:>10}  {:<9}  {:>10}  {:<9}  {:>11}  cause",
         "trial",
+        "verdict",
         "old J",
-        "old",
+        "suggested",
         "new J",
-        "new",
+        "suggested",
         "difference"
     );
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
     for result in results {
-        let RejudgedTrial { trial, old, new, .. } = result;
+        let RejudgedTrial { trial, judged, old, new, .. } = result;
         let difference = result.difference().map_or("-".to_owned(), |difference| format!("{difference:+.4}"));
         let (old_value, new_value) = (number(old.value), number(new.value));
-        let (old_name, new_name, cause) = (name(old.verdict), name(new.verdict), &new.cause);
+        let [verdict, old_name, new_name] = [*judged, old.verdict, new.verdict].map(name);
+        let cause = &new.cause;
         put_line!(
-            "{trial:>5}  {old_value:>10}  {old_name:<7}  {new_value:>10}  {new_name:<7}  {difference:>11}  {cause}"
+            "{trial:>5}  {verdict:<7}  {old_value:>10}  {old_name:<9}  {new_value:>10}  {new_name:<9}  {difference:>11}  {cause}"
         );
     }
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4} m"));
@@ -87,7 +90,7 @@ fn print(results: &[RejudgedTrial], unit: &str) {
     }
     let changed = results.iter().filter(|result| result.new.differs(&result.old)).count();
     put_line!(
-        "{changed} of {} trials change. J in {unit}, as measured, before the verdict; a fall counts as 0.",
+        "{changed} of {} suggestions change; verdicts are those in force. J in {unit}, as measured; a fall counts as 0.",
         results.len()
     );
 }
@@ -101,11 +104,18 @@ fn json_of(result: &RejudgedTrial) -> Value {
             "measured": judgement.measured,
         })
     };
-    let RejudgedTrial { trial, old, new, estimate } = result;
+    let RejudgedTrial { trial, judged, old, new, estimate } = result;
     let estimate = estimate.map(|change| {
         let EstimateChange { distance_m, old_error_m, new_error_m } = change;
         json!({ "distance_m": distance_m, "old_error_m": old_error_m, "new_error_m": new_error_m })
     });
     let difference = result.difference();
-    json!({ "trial": trial, "old": judgement(old), "new": judgement(new), "difference": difference, "estimate": estimate })
+    json!({
+        "trial": trial,
+        "verdict": judged.map(Verdict::name),
+        "old": judgement(old),
+        "new": judgement(new),
+        "difference": difference,
+        "estimate": estimate,
+    })
 }
