@@ -12,7 +12,9 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
     let again = format!("{trial} is void, and its parameters are proposed again");
     let output = match request {
         OperatorRequest::Judge(verdict) => {
-            let answer = format!("{trial}; u takes it back until the next trial is approved or skipped");
+            let answer = format!(
+                "{trial}; u takes it back until the next trial is approved or skipped, or the best is confirmed"
+            );
             judged(experiment.judge(*verdict, false), answer)
         }
         OperatorRequest::Rerun { trial: None } => judged(experiment.judge(Verdict::Void, true), again),
