@@ -259,6 +259,10 @@ fn the_study_says_for_how_many_trials_a_parameter_is_still_fixed() {
     experiment.close().unwrap();
     assert_eq!(words(), ["Fx is fixed at 60 for 2 trials that count, from trial 0: 1 left"]);
     let mut experiment = open(folder.path());
+    // Regression: a void verdict that could be taken back used one up here, and none on the operator's screen.
+    run(&mut experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Void, false).unwrap();
+    assert_eq!(words(), ["Fx is fixed at 60 for 2 trials that count, from trial 0: 1 left"]);
     accept(&mut experiment);
     experiment.close().unwrap();
     assert_eq!(words(), ["Fx was fixed at 60 for 2 trials that count, from trial 0"]);

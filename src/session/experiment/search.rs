@@ -10,7 +10,7 @@ use super::plan::ExperimentPlan;
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, six_digits};
+use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, Verdict, six_digits};
 
 impl FixedFrom {
     /// Returns the number of trials for which `name` is still fixed. A trial uses one up that has the fixed value, also
@@ -18,9 +18,12 @@ impl FixedFrom {
     /// the best.
     fn trials_left(&self, name: &str, trials: &[Trial]) -> u32 {
         let ran = |trial: &&Trial| {
-            trial.number >= self.from
-                && !matches!(trial.state, TrialState::Fail | TrialState::Waiting)
-                && TrialAttributes::of(trial).fixed.get(name) == Some(self.value)
+            if trial.number < self.from || matches!(trial.state, TrialState::Fail | TrialState::Waiting) {
+                return false;
+            }
+            // A void verdict that can be taken back is not reported yet.
+            let TrialAttributes { fixed, verdict, .. } = TrialAttributes::of(trial);
+            fixed.get(name) == Some(self.value) && verdict != Some(Verdict::Void)
         };
         self.trials.saturating_sub(trials.iter().filter(ran).count() as u32)
     }
