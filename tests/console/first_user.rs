@@ -247,6 +247,22 @@ fn stop_closes_every_form_and_applies_nothing_of_it() {
     assert_eq!(console.press(&["1", "Space"]), [Effect::Stop]);
 }
 
+/// Regression: values outside of the configured bounds were drawn at the edge of an axis that ended at these, right of their own number.
+#[test]
+fn the_axes_of_the_optimizer_reach_the_bounds_that_were_widened() {
+    let mut console = Console::ready();
+    console.press(&["3"]);
+    assert!(!console.screen(120, 40).contains("180.0"));
+    let fx = SearchedParameter { name: "Fx".into(), low: 60.0, high: 180.0, least: 0.0, most: 200.0, fixed: None };
+    console.record(Record::Search(SearchStatus { budget: 20, parameters: vec![fx], ..SearchStatus::default() }));
+    assert_shows(&console.screen(120, 40), &["180.0"]);
+    // A trial beyond, after the bounds were narrowed again, stays in its place.
+    let mut far = trial(0, Some(Verdict::Fall), None);
+    far.parameters = vec![("f0".into(), 1.25), ("Fx".into(), 195.0), ("Fz".into(), 250.0)].into();
+    console.record(Record::Trial(far));
+    assert_shows(&console.screen(120, 40), &["195.0"]);
+}
+
 /// Regression: the question about a re-run said that the point waits, though it was the proposal at once.
 #[test]
 fn the_question_about_a_rerun_says_when_it_runs() {

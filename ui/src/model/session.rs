@@ -170,6 +170,17 @@ impl SessionModel {
         self.search.as_ref().map_or(&[], |search| &search.queue)
     }
 
+    /// A parameter with the range that panels over it show: the study's own bounds, so that past trials stay where they were when
+    /// the search is narrowed, as far as the present bounds, a trial or the proposal do not lie outside of them.
+    pub fn with_shown_range(&self, info: &ParameterInfo) -> ParameterInfo {
+        let searched = self.searched(&info.name).into_iter().flat_map(|searched| [searched.low, searched.high]);
+        let ran = self.trials.records.values().filter_map(|trial| trial.parameters.get(&info.name));
+        let proposed = self.open_proposal().and_then(|p| p.parameters.iter().find(|p| p.name == info.name));
+        let values = searched.chain(ran).chain(proposed.map(|proposed| proposed.value));
+        let (low, high) = values.fold((info.low, info.high), |(low, high), value| (low.min(value), high.max(value)));
+        ParameterInfo { low, high, ..info.clone() }
+    }
+
     /// The parameter of that name as the search treats it at present.
     pub fn searched(&self, name: &str) -> Option<&SearchedParameter> {
         self.search.as_ref()?.parameters.iter().find(|parameter| parameter.name == name)

@@ -1,6 +1,6 @@
 //! View 3, Optimizer: objective over trials and parameters, the sampler's reasons, landing places.
 
-use quadfrog::trial::{SimulatorComparison, Verdict};
+use quadfrog::trial::{ParameterInfo, SimulatorComparison, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -42,9 +42,10 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(area);
     let (above, below) = (columns(scatters), columns(why));
     for (index, info) in parameters.iter().enumerate() {
-        render_scatter(frame, above[index], session, theme, index);
+        let info = session.with_shown_range(info);
+        render_scatter(frame, above[index], session, theme, &info);
         if session.simulator().is_none() {
-            densities::render(frame, below[index], session, info, theme);
+            densities::render(frame, below[index], session, &info, theme);
         }
     }
     if let Some(simulator) = session.simulator() {
@@ -79,9 +80,7 @@ fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparis
 }
 
 /// Every judged trial's value over one parameter; the proposal as a line.
-fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme, index: usize) {
-    // The study's own bounds: past trials stay where they were when the search is narrowed.
-    let info = &session.info.parameters[index];
+fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme, info: &ParameterInfo) {
     let body = heading(frame, area, theme, &objective_over(&info.name, &session.info.unit), &info.unit);
     let values = || session.trials.records.values().filter_map(|trial| trial.value);
     let (low, high) = (values().fold(0.0, f64::min), values().fold(LEAST_SPAN, f64::max));

@@ -1,5 +1,5 @@
-//! Axes of the panels over one parameter: the study's bounds to the right, so that all panels of a column agree, and the
-//! values upwards.
+//! Axes of the panels over one parameter: its shown range to the right, so that all panels of a column agree, and the values
+//! upwards.
 
 use quadfrog::trial::ParameterInfo;
 use ratatui::buffer::Buffer;

@@ -151,7 +151,9 @@ fn is_doubted(model: &Model, value: f64) -> bool {
 fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
     if text == "best" {
         let best = model.session.trials.best().map(|best| best.trial);
-        return best.map(ReplayCommand::Trial).ok_or("no trial was accepted up to here".to_owned());
+        return best
+            .map(ReplayCommand::Trial)
+            .ok_or("no trial was accepted before the playhead; best is the best so far".to_owned());
     }
     if let Some(number) = text.strip_prefix('#') {
         let trial =
