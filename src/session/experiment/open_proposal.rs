@@ -56,8 +56,8 @@ impl ApprovedProposal {
 
 impl OpenProposal {
     /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with other values
-    /// of its own, or repeats a point to confirm the best. `in_study` is true if the waiting trial of the study with the pending verdict waits in the study, too. `gains` are the
-    /// configured ones; `revision` must be one that no earlier proposal had.
+    /// of its own, or repeats a point to confirm the best. `in_study` is true if the waiting trial of the study with the pending
+    /// verdict waits in the study, too. `gains` are the configured ones; `revision` must be one that no earlier proposal had.
     pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> OpenProposal {
         let next = study.waiting().next();
         let queued = next.map(Trial::fixed).unwrap_or_default();
