@@ -1,6 +1,6 @@
 //! Search space, reasons of a proposal and statistics of repeated points, as they are shown.
 
-use super::{ParameterValues, ProposalSource, six_digits};
+use super::{ParameterInfo, ParameterValues, ProposalSource, four_digits};
 
 /// The present search space and the progress of the study.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -35,10 +35,14 @@ pub struct QueuedPoint {
 }
 
 impl QueuedPoint {
-    /// Returns its values in words, `f0 1.3, Fx 90, Fz 240`; those that it lacks come from the sampler.
-    pub fn in_words(&self) -> String {
-        let values = self.parameters.iter().chain(self.gains.iter());
-        let values: Vec<_> = values.map(|(name, value)| format!("{name} {}", six_digits(*value))).collect();
+    /// Returns its values in words, `f0 1.300 Hz, Fx 90.00 N`, with the units of `known` parameters and gains; those that it lacks come
+    /// from the sampler.
+    pub fn in_words<'a>(&self, known: impl Iterator<Item = &'a ParameterInfo> + Clone) -> String {
+        let in_words = |(name, value): &(String, f64)| {
+            let unit = known.clone().find(|info| info.name == *name).map_or("", |info| info.unit.as_str());
+            format!("{name} {} {unit}", four_digits(*value)).trim_end().to_owned()
+        };
+        let values: Vec<String> = self.parameters.iter().chain(self.gains.iter()).map(in_words).collect();
         if values.is_empty() { "parameters from the sampler".to_owned() } else { values.join(", ") }
     }
 }

@@ -208,7 +208,9 @@ fn a_queued_point_is_shown_whole_in_a_narrow_queue() {
             let screen = console.screen(columns, rows);
             let box_rows: Vec<&str> = screen.lines().filter_map(|line| line.split('│').nth(1)).collect();
             let text = box_rows.join(" ").split_whitespace().collect::<Vec<_>>().join(" ");
-            let whole = format!("#{trial} re-run of #3 f0 1.3, Fx 90.25, Fz 240.125, kp 450, kd 9.5, kd_joint 0.85");
+            let whole = format!(
+                "#{trial} re-run of #3 f0 1.300 Hz, Fx 90.25 N, Fz 240.1 N, kp 450.0 N/m, kd 9.500 N s/m, kd_joint 0.850 N m s/rad"
+            );
             assert!(text.contains(&whole) && !text.contains(".. "), "{whole}:\n{screen}");
             console.press(&["Down"]);
         }

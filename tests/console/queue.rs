@@ -43,7 +43,12 @@ fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
         ));
     }
     session.send("N");
-    session.wait_for(&["Queue", "#0    queued          f0 1.1, Fx 60, Fz 240", "#1", "#2    queued          f0 1.3"]);
+    session.wait_for(&[
+        "Queue",
+        "#0    queued          f0 1.100 Hz, Fx 60.00 N, Fz 240.0 N",
+        "#1",
+        "#2    queued          f0 1.3",
+    ]);
     (session, study)
 }
 
@@ -55,7 +60,7 @@ fn queued_points_are_seen_moved_and_removed() {
     session.send("\x1b[B\x1b[B");
     session.send("\x1b[D");
     session.wait_for(&["#1    queued          f0 1.3", "#2    queued          f0 1.2"]);
-    session.wait_for(&["move earlier: f0 1.3, Fx 60, Fz 240 is number 2 of 3 in the queue now"]);
+    session.wait_for(&["move earlier: f0 1.300 Hz, Fx 60.00 N, Fz 240.0 N is number 2 of 3 in the queue now"]);
     session.send("\x1b[D");
     session.wait_for(&["#0    queued          f0 1.3", "#1    queued          f0 1.1"]);
     session.send("\x1b[D");

@@ -380,9 +380,12 @@ fn a_moved_point_is_named_by_its_values_and_its_place() {
         experiment.enqueue(&[("f0".into(), f0), ("Fx".into(), 60.0), ("Fz".into(), 250.0)]).unwrap();
     }
     let moved = experiment.move_queued(1, false).unwrap();
-    assert_eq!((moved.point.in_words(), moved.place, moved.of), ("f0 1.2, Fx 60, Fz 250".to_owned(), 3, 3));
+    assert_eq!(
+        (experiment.in_words(&moved.point), moved.place, moved.of),
+        ("f0 1.200 Hz, Fx 60.00 N, Fz 250.0 N".to_owned(), 3, 3)
+    );
     let moved = experiment.move_queued(1, true).unwrap();
-    assert_eq!((moved.point.in_words(), moved.place), ("f0 1.3, Fx 60, Fz 250".to_owned(), 1));
+    assert_eq!((experiment.in_words(&moved.point), moved.place), ("f0 1.300 Hz, Fx 60.00 N, Fz 250.0 N".to_owned(), 1));
 }
 
 /// Regression: the answer to a re-run from the table did not say that it is the proposal at once.

@@ -47,6 +47,11 @@ impl Experiment {
         self.change_open(Changes::default())
     }
 
+    /// Returns the values of a queued point in words, with units.
+    pub fn in_words(&self, point: &QueuedPoint) -> String {
+        point.in_words(self.plan.parameters.iter().chain(&self.plan.gains))
+    }
+
     /// Returns in words what the operator has changed in the proposal, with units.
     pub fn overrides_in_words(&self) -> String {
         let Some(proposal) = self.proposal() else { return String::new() };

@@ -198,7 +198,8 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::MoveQueued { trial, earlier } => {
             let moved = experiment.move_queued(*trial, *earlier)?;
-            format!("{} is number {} of {} in the queue now", moved.point.in_words(), moved.place, moved.of)
+            let values = experiment.in_words(&moved.point);
+            format!("{values} is number {} of {} in the queue now", moved.place, moved.of)
         }
         OperatorRequest::Continue(trials) => {
             experiment.extend(*trials)?;

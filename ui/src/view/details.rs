@@ -3,7 +3,7 @@
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
 use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord, six_digits};
 
-use super::draw::clock;
+use super::draw::{clock, falls_near};
 use super::points;
 use crate::model::session::SessionModel;
 use crate::theme::Theme;
@@ -88,7 +88,7 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
             }
             _ => String::new(),
         };
-        row("risk before", format!("{} of the {} nearest fell{nearest}", risk.falls, risk.neighbours));
+        row("risk before", falls_near(&risk) + &nearest);
     }
     if let Some(expected) = &trial.expected {
         let ExpectedResult { value, deviation, p_stand, .. } = expected;

@@ -5,7 +5,8 @@ use std::time::Duration;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use quadfrog::printable::is_unprintable;
-use quadfrog::trial::{ExpectedResult, Verdict};
+pub use quadfrog::trial::four_digits as number;
+use quadfrog::trial::{ExpectedResult, FallRisk, Verdict};
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -41,14 +42,14 @@ pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside:
     rest
 }
 
-/// A number with four significant digits, as far as they fit: 1.243, 18.20, 118.2, 1240.
-pub fn number(value: f64) -> String {
-    match value.abs() {
-        _ if !value.is_finite() => "-".to_owned(),
-        size if size >= 1000.0 => format!("{value:.0}"),
-        size if size >= 100.0 => format!("{value:.1}"),
-        size if size >= 10.0 => format!("{value:.2}"),
-        _ => format!("{value:.3}"),
+/// The falls among the nearest judged trials, in words: `2 of the 5 nearest trials fell`.
+pub fn falls_near(risk: &FallRisk) -> String {
+    match (risk.falls, risk.neighbours) {
+        (0, 1) => "the nearest trial stood".to_owned(),
+        (_, 1) => "the nearest trial fell".to_owned(),
+        (0, of) => format!("none of the {of} nearest trials fell"),
+        (falls, of) if falls == of => format!("all {of} nearest trials fell"),
+        (falls, of) => format!("{falls} of the {of} nearest trials fell"),
     }
 }
 

@@ -11,7 +11,7 @@ use ratatui::widgets::Paragraph;
 use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
 use super::draw::{NO_STATE, bar, heading, span, without_sign_of_zero};
 use super::series_style::{SeriesStyle, style};
-use super::{beside, objective, proposal, trials, wireframe};
+use super::{beside, objective, points, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
 use crate::model::history::SignalHistory;
@@ -90,7 +90,9 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
 
 /// Rows of the card of a trial: equal over the stages of a study, more where the cause of a verdict needs them.
 fn card_rows(model: &Model, width: u16) -> u16 {
-    model.session.trial_rows().max(proposal::rows(model, width))
+    // In few columns the nearest falls take two lines, not three, and a trial that waits for its verdict has a place of its own.
+    let spared = u16::from(usize::from(width) < points::WORDS_FROM);
+    (model.session.trial_rows() - spared).max(proposal::rows(model, width))
 }
 
 /// The trials side by side in place of the proposal: in a replay only, because a live session shows its proposal in any

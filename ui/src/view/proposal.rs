@@ -9,7 +9,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{expectation, heading, number, scale, span, with_deviation};
+use super::draw::{expectation, falls_near, heading, number, scale, span, with_deviation};
 use super::points;
 use crate::action::Action;
 use crate::legal::legal;
@@ -79,7 +79,7 @@ fn content(model: &Model, width: usize) -> PanelText {
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
             lines.extend(expected(session, theme, proposal.expected));
-            lines.push(risk(theme, proposal.risk));
+            lines.push(risk(theme, proposal.risk, width));
             if let Some(share) = session.search.as_ref().and_then(|search| search.hop_share) {
                 let text = format!(" hop envelope: {:.0} % of force", 100.0 * share);
                 lines.push(Line::from(span(theme, Role::Warning, text)));
@@ -152,14 +152,19 @@ fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResu
     lines
 }
 
-fn risk(theme: &Theme, risk: Option<FallRisk>) -> Line<'static> {
+fn risk(theme: &Theme, risk: Option<FallRisk>, width: usize) -> Line<'static> {
     let Some(risk) = risk.filter(|risk| risk.neighbours > 0) else {
         return Line::from(span(theme, Role::Quiet, " no judged trial near it yet"));
     };
     let role = if risk.falls * 2 >= risk.neighbours { Role::Warning } else { Role::Quiet };
-    let mut text = format!(" {} of the {} nearest fell", risk.falls, risk.neighbours);
+    let mut text = format!(" {}", falls_near(&risk));
     if let (Some(distance), Some(trial)) = (risk.nearest_fall, risk.nearest_fall_trial) {
-        text.push_str(&format!("; nearest fall #{trial}, {distance:.2} away (1: a whole range)"));
+        // In few columns two lines; the details of the trial explain the distance.
+        let place = match width >= points::WORDS_FROM {
+            true => format!(", {distance:.2} away (1: a range)"),
+            false => format!(" at {distance:.2}"),
+        };
+        text.push_str(&format!("; nearest fall #{trial}{place}"));
     }
     Line::from(span(theme, role, text))
 }

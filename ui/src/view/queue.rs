@@ -35,7 +35,7 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
     for (index, point) in queue.iter().enumerate() {
         let role = if index == selected { Role::Selected } else { Role::Text };
         let begin = lines.len();
-        for row in wrap(&Line::from(described(point)), width, INDENT) {
+        for row in wrap(&Line::from(described(model, point)), width, INDENT) {
             lines.push(Line::from(span(theme, role, format!("{:<width$}", row.to_string()))));
         }
         if index == selected {
@@ -45,8 +45,9 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
     (lines, of_selected)
 }
 
-/// Returns a point in words: `#8  re-run of #3  f0 1.3, Fx 90, Fz 240`.
-fn described(point: &QueuedPoint) -> String {
+/// Returns a point in words, with the digits and units of the card: `#8  re-run of #3  f0 1.300 Hz, Fx 90.00 N, Fz 240.0 N`.
+fn described(model: &Model, point: &QueuedPoint) -> String {
+    let info = &model.session.info;
     let source = point.source.with_parent(point.parent);
-    format!("#{:<4} {source:<15} {}", point.trial, point.in_words())
+    format!("#{:<4} {source:<15} {}", point.trial, point.in_words(info.parameters.iter().chain(&info.gains)))
 }
