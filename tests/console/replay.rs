@@ -201,7 +201,7 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
     }
     // After the last one it stays there and says so.
     session.send("}");
-    session.wait_for(&["no further trial that fell, or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.wait_for(&["no further fall or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
     session.send(")");
     session.wait_for(&[&shown(timeline().duration_ns())]);
     session.send("]");

@@ -151,11 +151,9 @@ impl ReplayFeed {
             ReplayCommand::PreviousMarker => {
                 self.go_to_place(before(self.markers(), self.passed()), "no earlier trial or fault");
             }
-            ReplayCommand::NextFall => {
-                self.go_to_place(after(self.falls(), at), "no further trial that fell, or fault")
-            }
+            ReplayCommand::NextFall => self.go_to_place(after(self.falls(), at), "no further fall or fault"),
             ReplayCommand::PreviousFall => {
-                self.go_to_place(before(self.falls(), self.passed()), "no earlier trial that fell, or fault");
+                self.go_to_place(before(self.falls(), self.passed()), "no earlier fall or fault");
             }
             ReplayCommand::Start => self.go_to(0),
             ReplayCommand::End => self.go_to_end(),
