@@ -212,6 +212,14 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
     session.wait_for(&["no earlier trial or fault", "00:00.000"]);
 }
 
+/// Regression: from the start of a recording `best` led nowhere, and later to the best before the playhead.
+#[test]
+fn the_best_is_that_of_the_whole_recording() {
+    let mut session = paused(&recording());
+    go(&mut session, "0", "00:00.000");
+    go(&mut session, "best", &shown(span(2).begin_ns));
+}
+
 /// Lets time pass; the state of the replay after it.
 fn status(feed: &mut Feed, milliseconds: u64) -> ReplayStatus {
     let messages = feed.poll(milliseconds * 1_000_000);

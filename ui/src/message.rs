@@ -249,6 +249,8 @@ pub struct ReplayTimeline {
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// The best trial at the end of the recording, by the rule of the table; none without an accepted one.
+    pub best: Option<u32>,
     /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.
     pub begins_utc_ns: Vec<(u64, u64)>,
     /// The second recording; none without one.

@@ -15,6 +15,7 @@ use quadfrog::telemetry::{Phase, Snapshot};
 use super::beside::TrialPair;
 use super::rejudge::rejudge;
 use crate::message::{Msg, RejudgeNews, ReplayCommand, ReplayStatus, ReplayStep, ReplayTimeline};
+use crate::model::trials::Trials;
 
 /// Most results of judging again per call.
 const BATCH: usize = 256;
@@ -318,6 +319,7 @@ impl ReplayFeed {
             faults_ns: faults.map(|marker| marker.time_ns).collect(),
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
+            best: best_of(&self.recording),
             begins_utc_ns: self.recording.begins_utc_ns(),
             second: self.pair.second(),
         };
@@ -423,6 +425,19 @@ fn before(times: impl DoubleEndedIterator<Item = u64>, time_ns: u64) -> Option<u
 /// The begin of a loop: shortly before the impulse, or the begin of a trial whose impulse is not recorded as an event.
 fn loop_begin(span: &TrialRun) -> u64 {
     span.impulse_ns.map_or(span.begin_ns, |impulse| impulse.saturating_sub(BEFORE_IMPULSE_NS).max(span.begin_ns))
+}
+
+/// Returns the best trial at the end of a recording: that of the sampler's model, or of the highest mean over its repeats.
+fn best_of(recording: &Timeline) -> Option<u32> {
+    let mut trials = Trials { records: recording.rows(), ..Trials::default() };
+    for event in recording.events_before(u64::MAX) {
+        match event.record {
+            Record::Insight(insight) => trials.model_best = insight.predicted_best().copied(),
+            Record::Points(points) => trials.points = points,
+            _ => {}
+        }
+    }
+    trials.best().map(|best| best.trial)
 }
 
 /// A line of the log about the recording itself.

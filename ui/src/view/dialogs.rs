@@ -314,7 +314,7 @@ fn field(
             )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial as #7, or best (so far)".to_owned(),
+        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial #7, or best of the recording".to_owned(),
         Purpose::Rejudge => "a folder as for --config; empty: the defaults; the file is not changed".to_owned(),
         Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
             Some(second) => format!("its number in {}", second.name),

@@ -150,10 +150,12 @@ fn is_doubted(model: &Model, value: f64) -> bool {
 /// The place that a text names: a time or a trial.
 fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
     if text == "best" {
-        let best = model.session.trials.best().map(|best| best.trial);
-        return best
-            .map(ReplayCommand::Trial)
-            .ok_or("no trial was accepted before the playhead; best is the best so far".to_owned());
+        let timeline = model.timeline.as_ref();
+        let best = timeline.and_then(|timeline| timeline.best).ok_or("the recording has no accepted trial")?;
+        return match timeline.is_some_and(|timeline| timeline.has_ticks_of(best)) {
+            true => Ok(ReplayCommand::Trial(best)),
+            false => Err(format!("the best is trial {best}, which is not in this recording")),
+        };
     }
     if let Some(number) = text.strip_prefix('#') {
         let trial =
