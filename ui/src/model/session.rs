@@ -33,6 +33,8 @@ pub struct SessionModel {
     pub last_judged: Option<u32>,
     /// Cause of the newest DAMPED or FAULT.
     pub stopped_because: String,
+    /// Cause for which the robot sat down without a request; empty once the operator has made one.
+    pub sat_down_because: String,
 }
 
 impl SessionModel {

@@ -52,7 +52,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.clock = now;
             expire_interrupt(model);
             expire_answer(model);
-            records::show_fault_again(model);
+            records::show_reason_again(model);
         }
         Msg::Resize(columns, rows) => {
             model.size = (columns, rows);

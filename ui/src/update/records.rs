@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use quadfrog::engine::STOP_BY;
-use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped};
-use quadfrog::telemetry::Mode;
+use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
+use quadfrog::telemetry::{Fault, Mode, TransitionCause};
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 
 use super::request::{cancelled, reply, say};
@@ -17,8 +17,8 @@ use crate::model::trials::RunTime;
 use crate::model::{Model, Notice};
 use crate::settings::BellCause;
 
-/// Time for which an answer replaces the reason of a fault.
-const FAULT_AGAIN: Duration = Duration::from_secs(5);
+/// Time for which another message replaces the reason of a fault, or why the robot sat down.
+const REASON_AGAIN: Duration = Duration::from_secs(5);
 
 /// Closes a question that no longer applies: an approval holds for the shown revision and while the robot stands.
 pub(super) fn close_stale_dialog(model: &mut Model) {
@@ -84,8 +84,15 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let level = match change.to {
                 Mode::Fault => LogLevel::Error,
                 Mode::Damped => LogLevel::Warning,
+                Mode::SitDown if is_unasked(&change) => LogLevel::Warning,
                 _ => LogLevel::Info,
             };
+            if change.to == Mode::SitDown && level == LogLevel::Warning {
+                model.session.sat_down_because.clone_from(&change.cause);
+                say(model, level, sat_down(&change.cause));
+            } else if change.to != Mode::Disarmed {
+                model.session.sat_down_because.clear();
+            }
             // The observer who stopped may have been reported before the stop.
             let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
             let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
@@ -199,6 +206,18 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     if rings { vec![Effect::Bell] } else { Vec::new() }
 }
 
+/// Whether neither the operator nor the end of the session has sat the robot down: a failsafe, or the time without an approval.
+fn is_unasked(change: &Transition) -> bool {
+    let expected =
+        [TransitionCause::Command, TransitionCause::StepFinished, TransitionCause::Fault(Fault::OperatorLeft)];
+    expected.iter().all(|cause| cause.to_string() != change.cause)
+}
+
+/// Returns in words why the robot sat down.
+fn sat_down(cause: &str) -> String {
+    format!("the robot sat down: {cause}")
+}
+
 /// Lays the ground of a trial that runs.
 fn lay_ground(model: &mut Model, trial: u32) {
     let row = model.session.trials.records.get(&trial);
@@ -239,6 +258,9 @@ fn say_suggestion(model: &mut Model, trial: u32) {
 
 fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
     let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
+    if command.accepted {
+        model.session.sat_down_because.clear();
+    }
     let text = match command.answer.as_str() {
         "" => command.request.clone(),
         answer => format!("{}: {outcome}{answer}", command.request),
@@ -274,16 +296,22 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
     log(model, time_ns, LogLevel::Info, "trial", text, trial.verdict.is_some());
 }
 
-/// Shows the reason of a latched fault again once an answer that has replaced it was read: the line below has no room for it in a
-/// narrow terminal.
-pub(super) fn show_fault_again(model: &mut Model) {
-    let text = format!("{}: {}", Mode::Fault.name(), model.session.stopped_because);
-    let read = |message: &Notice| message.text == text || model.clock.saturating_sub(message.at) < FAULT_AGAIN;
-    if model.mode() == Mode::Fault
-        && !model.session.stopped_because.is_empty()
-        && !model.message.as_ref().is_some_and(read)
-    {
-        say(model, LogLevel::Error, text);
+/// Shows the reason of a latched fault, or why the robot sat down, again once a message that has replaced it was read: the line below
+/// has no room for it in a narrow terminal.
+pub(super) fn show_reason_again(model: &mut Model) {
+    let session = &model.session;
+    let (level, text) = match model.mode() {
+        Mode::Fault if !session.stopped_because.is_empty() => {
+            (LogLevel::Error, format!("{}: {}", Mode::Fault.name(), session.stopped_because))
+        }
+        Mode::SitDown | Mode::Disarmed if !session.sat_down_because.is_empty() => {
+            (LogLevel::Warning, sat_down(&session.sat_down_because))
+        }
+        _ => return,
+    };
+    let read = |message: &Notice| message.text == text || model.clock.saturating_sub(message.at) < REASON_AGAIN;
+    if !model.message.as_ref().is_some_and(read) {
+        say(model, level, text);
     }
 }
 
