@@ -349,7 +349,7 @@ fn a_finished_study_says_so_and_what_comes_next() {
     assert!(console.screen(80, 24).contains("How many repeats at most"));
     assert_eq!(console.requests(&["Enter"]), [OperatorRequest::ConfirmBest { repeats: 10 }]);
     console.record(Record::Search(SearchStatus { confirming: Some(7), ..search((0.0, 150.0), None) }));
-    assert_eq!(console.requests(&["K"]), [OperatorRequest::ConfirmBest { repeats: 0 }], "the same key ends it");
+    assert_eq!(console.requests(&["K", "y"]), [OperatorRequest::ConfirmBest { repeats: 0 }], "the same key ends it");
     assert_eq!(console.press(&["E"]), [Effect::ExportBest]);
 }
 

@@ -167,7 +167,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Queue, "queue", &["N"], G::Proposal, "the queue: see, move and remove the points that run next"),
         row(A::Skip, "skip", &["n"], G::Proposal, "skip the proposal, after a question; another follows"),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
-        row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats"),
+        row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats, after a question"),
         row(A::ExportBest, "export-best", &["E"], G::Proposal, "write the best parameters as a configuration beside the study"),
 
         row(A::Accept, "accept", &["a"], G::Verdict, "accept: it counts with its value (Trials, while none waits: change the selected row, with a reason)"),

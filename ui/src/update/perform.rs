@@ -87,7 +87,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         }
         Action::Continue => open(model, Dialog::field(Purpose::Continue, "20")),
         Action::ConfirmBest if model.session.confirming().is_some() => {
-            return request(model, OperatorRequest::ConfirmBest { repeats: 0 });
+            open(model, Dialog::Confirm(Question::EndRepeats));
         }
         Action::ConfirmBest => open(model, Dialog::field(Purpose::ConfirmBest, "10")),
         Action::ExportBest => return vec![Effect::ExportBest],

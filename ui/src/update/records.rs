@@ -40,6 +40,9 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         Some(Dialog::Confirm(Question::RemoveQueued { trial })) => {
             model.session.queue().iter().all(|point| point.trial != *trial)
         }
+        Some(Dialog::Confirm(Question::EndRepeats)) => {
+            model.session.confirming().is_none() || legal(Action::ConfirmBest, model).is_err()
+        }
         Some(Dialog::Confirm(Question::Undo { trial })) => model.session.undoable() != Some(*trial),
         Some(Dialog::Confirm(Question::Rerun { .. })) => legal(Action::Rerun, model).is_err(),
         Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),

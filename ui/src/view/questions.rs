@@ -196,6 +196,18 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             );
             ("Take the last verdict back?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "undo")])
         }
+        Question::EndRepeats => {
+            let left = counted(model.session.confirming().unwrap_or(0), "repeat");
+            let mut lines = vec![Line::from(format!("{left} will not be run: the best is not confirmed."))];
+            lines.extend(model.session.undoable().map(|trial| {
+                let undo = model.keymap.key(Action::Undo);
+                Line::from(format!(
+                    "The verdict of trial #{trial} then stays: {undo} does not take it back any longer."
+                ))
+            }));
+            lines.extend([Line::default(), answers(&model.theme, "y", "end them")]);
+            ("End the repeats?", lines)
+        }
         Question::JudgeAnyway { trial, .. } => {
             let Some(row) = model.session.not_to_accept() else { return ("Accept?", Vec::new()) };
             let value = value(model, row);

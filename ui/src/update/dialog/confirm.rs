@@ -122,6 +122,11 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
                 false => cancelled(model, "not removed"),
             }
         }
+        Question::EndRepeats if yes => {
+            let end = OperatorRequest::ConfirmBest { repeats: 0 };
+            request_if_legal(model, Action::ConfirmBest, end, "the repeats go on")
+        }
+        Question::EndRepeats => cancelled(model, "the repeats go on"),
         Question::Undo { trial } if yes && model.session.undoable() == Some(*trial) => {
             request_if_legal(model, Action::Undo, OperatorRequest::Undo, "not taken back")
         }
