@@ -271,12 +271,15 @@ fn the_question_about_a_rerun_says_when_it_runs() {
     console.record(Record::Proposal(proposal(1, 0)));
     console.stage(ExperimentStage::Proposed, 1);
     console.press(&["2", "r"]);
-    assert_shows(&console.screen(80, 24), &["The parameters of trial #0 are the proposal now; the sampler's follows."]);
+    assert_shows(
+        &console.screen(80, 24),
+        &["The parameters of trial #0 will be the proposal; the sampler's follows them."],
+    );
     console.press(&["Esc"]);
     let queued = |trial| QueuedPoint { trial, source: ProposalSource::Queued, ..QueuedPoint::default() };
     console.record(Record::Search(SearchStatus { queue: vec![queued(1), queued(2)], ..SearchStatus::default() }));
     console.press(&["r"]);
-    assert_shows(&console.screen(80, 24), &["The parameters of trial #0 wait in the queue behind 2 points."]);
+    assert_shows(&console.screen(80, 24), &["The parameters of trial #0 will wait in the queue behind 2 points."]);
 }
 
 /// Regression: the empty queue named the form of the override as the only place of the key.

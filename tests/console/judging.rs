@@ -556,7 +556,10 @@ fn the_last_verdict_is_taken_back_from_another_row_after_a_question_alone() {
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 3, can_undo: true, jumps: 0 }));
     assert_eq!(console.requests(&["2", "Home", "u"]), [], "trial 0 is selected");
     let screen = console.screen(80, 24);
-    assert_shows(&screen, &["Take the last verdict back?", "of trial #2 is taken back", "Press y to take the verdict"]);
+    assert_shows(
+        &screen,
+        &["Take the last verdict back?", "of trial #2 will be taken back", "Press y to take the verdict"],
+    );
     assert_eq!(console.requests(&["Enter"]), []);
     assert_eq!(console.requests(&["u", "y"]), [OperatorRequest::Undo]);
     // On its own row, and in another view, it is taken back at once.

@@ -71,7 +71,7 @@ fn queued_points_are_seen_moved_and_removed() {
     session.send("N");
     session.wait_for(&["#1    queued          f0 1.1"]);
     session.send("\x1b[Bx");
-    session.wait_for(&["Remove it from the queue?", "Trial #1 leaves the queue"]);
+    session.wait_for(&["Remove it from the queue?", "Trial #1 will leave the queue"]);
     session.send("y");
     session.wait_for(&["remove trial 1 from the queue: it does not run", "#2    queued          f0 1.2"]);
     assert!(!session.screen().contains("#1    queued"), "{}", session.screen());
@@ -160,7 +160,7 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut session, _) = session_with_queue(folder.path());
     session.send("x");
-    session.wait_for(&["Trial #0, the present proposal, leaves the queue"]);
+    session.wait_for(&["Trial #0, the present proposal, will leave the queue"]);
     session.send("n");
     session.wait_for(&["cancelled: not removed", "#0    queued          f0 1.1"]);
     session.send("x");

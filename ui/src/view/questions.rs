@@ -138,7 +138,8 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
 pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'static>>) {
     match question {
         Question::Skip { trial, .. } => {
-            let text = format!("Trial #{trial} is not run; the sampler does not see it. Another proposal follows.");
+            let text =
+                format!("Trial #{trial} will not be run; the sampler does not see it. Another proposal follows.");
             let answer = answers(&model.theme, "y", "skip");
             ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
         }
@@ -147,10 +148,12 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             // A repeat that confirms the best runs after what the operator queues.
             let before = model.session.queue().iter().filter(|point| !confirms(point.source)).count();
             let follows = match model.session.open_proposal() {
-                None => "wait in the queue until the study has more trials".to_owned(),
-                Some(_) if before > 0 => format!("wait in the queue behind {}", counted(before as u32, "point")),
-                Some(proposal) if confirms(proposal.source) => "are the proposal now; the repeat follows".to_owned(),
-                Some(_) => "are the proposal now; the sampler's follows".to_owned(),
+                None => "will wait in the queue until the study has more trials".to_owned(),
+                Some(_) if before > 0 => format!("will wait in the queue behind {}", counted(before as u32, "point")),
+                Some(proposal) if confirms(proposal.source) => {
+                    "will be the proposal; the repeat follows them".to_owned()
+                }
+                Some(_) => "will be the proposal; the sampler's follows them".to_owned(),
             };
             let text = format!("The parameters of trial #{trial} {follows}.");
             let answer = answers(&model.theme, "y", "queue");
@@ -175,7 +178,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
         Question::QueueProposed { trial } => {
             let lines = vec![
                 Line::from(format!(
-                    "Trial #{trial} is queued itself and remains the proposal: its values run once more after it."
+                    "Trial #{trial} is queued itself and remains the proposal: its values will run once more after it."
                 )),
                 Line::default(),
                 answers(&model.theme, "y", "queue"),
@@ -186,13 +189,13 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let proposed = model.session.open_proposal().is_some_and(|proposal| proposal.trial == *trial);
             let which = if proposed { ", the present proposal," } else { "" };
             let text =
-                format!("Trial #{trial}{which} leaves the queue: it is not run, and the sampler does not see it.");
+                format!("Trial #{trial}{which} will leave the queue: it is not run, and the sampler does not see it.");
             ("Remove it from the queue?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "remove")])
         }
         Question::Undo { trial } => {
             let verdict = model.session.trials.records.get(trial).and_then(|row| row.verdict_name()).unwrap_or("-");
             let text = format!(
-                "The verdict {verdict} of trial #{trial} is taken back: it waits for another. The selected row stays as it is."
+                "The verdict {verdict} of trial #{trial} will be taken back: it waits for another. The selected row stays as it is."
             );
             ("Take the last verdict back?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "undo")])
         }
