@@ -124,7 +124,7 @@ fn a_second_trial_lies_beside_the_present_one_aligned_at_the_impulse_until_escap
         session.send("|");
         session.wait_for(&["Which trial beside #2?"]);
         session.send("5\r");
-        session.wait_for(&["A #2 line, B #5 dotted, at +0.10 s", "A is trial 2, B is trial 5; Esc ends it"]);
+        session.wait_for(&["A #2 line, B #5 dotted, at +0.10 s", "A is trial 2, B is trial 5; Left and Right move"]);
         let shown = format!("roll A {} B {}", roll(0, 2, at_s), roll(0, 5, at_s));
         assert_shows(&session.screen(), &[&shown, "Two trials"]);
         assert_panel(&session, [&row(0, 2), &row(0, 5)]);

@@ -188,7 +188,10 @@ fn a_ghost_lies_under_the_jump_that_runs() {
     let mut console = jumped(&[0, 1]);
     let without = console.screen(120, 40);
     console.press(&["c"]);
-    assert_eq!(console.said(), "trial 1 is laid under the charts of a jump; a second one in Trials compares the two");
+    assert_eq!(
+        console.said(),
+        "trial 1 is laid under the charts of a jump; c on another row of Trials compares the two"
+    );
     console.press(&["2", "Home", "1"]);
     assert_ne!(console.screen(120, 40), without);
     console.press(&["c"]);
@@ -199,7 +202,10 @@ fn a_ghost_lies_under_the_jump_that_runs() {
 fn any_two_trials_are_compared_in_live() {
     let mut console = jumped(&[0, 1, 2]);
     console.press(&["2", "Home", "c", "End", "c"]);
-    assert_eq!(console.said(), "A is trial 0, B is trial 2: 1 shows both in Live");
+    assert_shows(
+        console.said(),
+        &["A is trial 0, B is trial 2: 1 shows both in Live; there Left and Right move the cursor"],
+    );
     assert!(line_with(&console.screen(80, 24), "   0~").contains("accept"));
     console.press(&["1"]);
     let screen = console.screen(120, 40);

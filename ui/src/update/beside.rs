@@ -2,8 +2,8 @@
 
 use quadfrog::recording::record::LogLevel;
 
+use super::navigate::keys_of_comparison;
 use super::request::reply;
-use crate::action::Action;
 use crate::message::{Effect, ReplayCommand, ReplayStatus, SideBySide};
 use crate::model::comparison::Comparison;
 use crate::model::dialog::{Dialog, Purpose};
@@ -52,8 +52,8 @@ pub(super) fn show(model: &mut Model, both: &SideBySide) {
     let before = model.live.comparison.as_ref().map(|shown| (shown.b.trial, shown.b.recording.clone()));
     if before != Some((both.b.trial, both.b.recording.clone())) {
         let place = if both.b.recording.is_some() { " of the second recording" } else { "" };
-        let end = model.keymap.key(Action::EndComparison);
-        let text = format!("A is trial {}, B is trial {}{place}; {end} ends it", both.a.trial, both.b.trial);
+        let keys = keys_of_comparison(model);
+        let text = format!("A is trial {}, B is trial {}{place}; {keys}", both.a.trial, both.b.trial);
         reply(model, LogLevel::Info, text);
     }
     model.live.ghost = None;

@@ -140,7 +140,11 @@ fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
     match (model.live.ghost, trial) {
         (Some(a), _) => {
             let comparable = model.history.traces().any(|trial| trial != a);
-            let second = if comparable { "; a second one in Trials compares the two" } else { "" };
+            let key = model.keymap.key(Action::Ghost);
+            let second = match comparable {
+                true => format!("; {key} on another row of Trials compares the two"),
+                false => String::new(),
+            };
             format!("trial {a} is laid under the charts of a jump{second}")
         }
         (None, Some(trial)) => no_signals(model, trial),
@@ -168,6 +172,13 @@ fn no_signals(model: &Model, trial: u32) -> String {
     }
 }
 
+/// Returns the keys of two trials that are laid over each other, in words.
+pub(super) fn keys_of_comparison(model: &Model) -> String {
+    let [left, right, end] =
+        [Action::Left, Action::Right, Action::EndComparison].map(|action| model.keymap.key(action));
+    format!("{left} and {right} move the cursor, {end} ends it")
+}
+
 fn second_ghost(model: &mut Model, a: u32) -> String {
     let Some(b) = model.selected_trial().map(|trial| trial.trial).filter(|b| *b != a) else { return no_ghost(model) };
     let compared = |trial: u32| ComparedTrial {
@@ -180,7 +191,7 @@ fn second_ghost(model: &mut Model, a: u32) -> String {
     match model.live.comparison {
         Some(_) => {
             let live = model.keymap.key(Action::LiveView);
-            format!("A is trial {a}, B is trial {b}: {live} shows both in Live")
+            format!("A is trial {a}, B is trial {b}: {live} shows both in Live; there {}", keys_of_comparison(model))
         }
         None => no_signals(model, b),
     }
