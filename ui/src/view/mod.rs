@@ -38,6 +38,7 @@ mod proposal;
 mod questions;
 mod queue;
 mod robot_shape;
+mod row_keys;
 mod scene;
 mod series_style;
 mod status_bar;

@@ -9,11 +9,12 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate};
+use super::row_keys;
 use crate::action::Action;
 use crate::legal::{legal, may_request, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
-use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose, Question};
+use crate::model::{Model, View};
 use crate::theme::Role;
 
 /// The most likely next step, and the others.
@@ -21,12 +22,35 @@ use crate::theme::Role;
 pub struct NextStep {
     /// The step itself, a sentence.
     pub lead: String,
+    /// The step in few words, for a line that lacks room for the keys; empty where the step itself stays.
+    pub short: String,
     /// Keys and their effects.
     pub others: Vec<(String, String)>,
 }
 
 /// The next possible step.
 pub fn next_step(model: &Model) -> NextStep {
+    let mut next = without_row(model);
+    if model.dialog.is_some() {
+        return next;
+    }
+    // Before the keys of the next step, but a verdict comes first.
+    let keys = row_keys::keys(model);
+    let at = if is_asked(model) { next.others.len() } else { 0 };
+    next.others.splice(at..at, keys);
+    next
+}
+
+/// Whether the robot, or a trial, waits for the operator's judgement.
+fn is_asked(model: &Model) -> bool {
+    if model.replay.is_some() {
+        return false;
+    }
+    matches!(model.mode(), Mode::Damped | Mode::Fault)
+        || model.session.under_review().is_some() && waiting_trial_is_meant(model).is_ok()
+}
+
+fn without_row(model: &Model) -> NextStep {
     match &model.dialog {
         Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
@@ -49,7 +73,7 @@ fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)
             (model.keymap.key(*action), format!("{text}{of}"))
         })
         .collect();
-    NextStep { lead: lead.into(), others }
+    NextStep { lead: lead.into(), short: String::new(), others }
 }
 
 fn live(model: &Model) -> NextStep {
@@ -148,7 +172,12 @@ fn live(model: &Model) -> NextStep {
                     format!("Not ready to arm: {failing} checks have not passed. {shows} shows them.")
                 }
             };
-            step(lead, model, &[change, undo, (Action::Help, "help"), quit])
+            let short = match session.failing_checks() {
+                _ if session.arming_checks.is_empty() => String::new(),
+                0 => format!("Press {} to arm.", key(Action::Arm)),
+                _ => format!("{} shows failed checks.", key(Action::ArmingChecks)),
+            };
+            NextStep { short, ..step(lead, model, &[change, undo, (Action::Help, "help"), quit]) }
         }
         Mode::Ready if session.open_proposal().is_some() && model.snapshot.unready.is_some() => {
             let reason = model.snapshot.unready.map(|reason| reason.to_string()).unwrap_or_default();
@@ -160,7 +189,8 @@ fn live(model: &Model) -> NextStep {
                 true => format!("Press {approve} to jump: y confirms the area, {approve} again jumps."),
                 false => format!("Press {approve} twice to jump."),
             };
-            step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down])
+            let short = if session.info.is_hardware() { format!("Press {approve} to jump.") } else { String::new() };
+            NextStep { short, ..step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down]) }
         }
         _ => step("The sampler is choosing the next trial.", model, &[sit_down]),
     }
@@ -371,7 +401,7 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Details { .. } => format!("Up Down other trials, PgUp PgDn scroll, {close}"),
         Dialog::LogLine { .. } => format!("Up Down other lines, PgUp PgDn scroll, {close}"),
     };
-    NextStep { lead, others: Vec::new() }
+    NextStep { lead, short: String::new(), others: Vec::new() }
 }
 
 pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
@@ -382,9 +412,14 @@ pub(super) fn render(frame: &mut Frame, area: Rect, model: &Model) {
 /// others.
 pub(super) fn line_within(model: &Model, width: usize) -> Line<'static> {
     let theme = &model.theme;
-    let next = next_step(model);
-    let room = width.saturating_sub(next.lead.chars().count() + 1);
+    let mut next = next_step(model);
     let columns = |(key, text): &(String, String)| key.chars().count() + text.chars().count() + 4;
+    // In Trials the keys of the row are worth more than the words of the step.
+    let whole = 1 + next.lead.chars().count() + next.others.iter().map(columns).sum::<usize>();
+    if model.view == View::Trials && !next.short.is_empty() && whole > width {
+        next.lead = std::mem::take(&mut next.short);
+    }
+    let room = width.saturating_sub(next.lead.chars().count() + 1);
     let more = (model.keymap.key(Action::Help), "more".to_owned());
     let mut shown = next.others;
     let width_of = |shown: &[(String, String)]| shown.iter().map(columns).sum::<usize>();

@@ -1,0 +1,51 @@
+//! The keys of the selected row of Trials, and those of two trials that are laid over each other, for the last line.
+
+use crate::action::Action;
+use crate::legal::legal;
+use crate::model::{Model, View};
+
+/// Keys and their effects, as far as they are accepted now; none in other views.
+pub fn keys(model: &Model) -> Vec<(String, String)> {
+    match model.view {
+        View::Trials => of_row(model),
+        View::Live if model.live.comparison.is_some() => of_comparison(model),
+        _ => Vec::new(),
+    }
+}
+
+fn of_comparison(model: &Model) -> Vec<(String, String)> {
+    let key = |action| model.keymap.key(action);
+    let mut keys = vec![(format!("{} {}", key(Action::Left), key(Action::Right)), "cursor".to_owned())];
+    // The last line of a replay names it already.
+    if model.replay.is_none() {
+        keys.insert(0, (key(Action::EndComparison), "end comparison".to_owned()));
+    }
+    keys
+}
+
+fn of_row(model: &Model) -> Vec<(String, String)> {
+    let Some(trial) = model.selected_trial().map(|row| row.trial) else { return Vec::new() };
+    let key = |action| model.keymap.key(action);
+    let goes_there = model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial))
+        && model.snapshot.tick.trial != Some(trial);
+    let open = if goes_there { "go to it" } else { "open" };
+    let mut keys = vec![(key(Action::Open), open.to_owned())];
+    if model.history.trace(trial).is_some() {
+        let same = model.live.comparison.is_none() && model.live.ghost == Some(trial);
+        keys.push((key(Action::Ghost), if same { "not under charts" } else { "compare" }.to_owned()));
+    }
+    // The step itself names the verdicts of a trial that waits.
+    if model.session.under_review().is_some() {
+        return keys;
+    }
+    let accepted = |action: &Action| legal(*action, model).is_ok();
+    let verdicts: Vec<String> =
+        [Action::Accept, Action::Fall, Action::Void].into_iter().filter(accepted).map(key).collect();
+    if !verdicts.is_empty() {
+        keys.push((verdicts.join(" "), "judge".to_owned()));
+    }
+    if accepted(&Action::Rerun) {
+        keys.push((key(Action::Rerun), "re-run".to_owned()));
+    }
+    keys
+}
