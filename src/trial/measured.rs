@@ -5,7 +5,8 @@ use strum::{IntoStaticStr, VariantArray};
 
 use super::{Task, Verdict};
 
-/// Beginning of the cause of a verdict that was changed after it had become final.
+/// Part of the cause of a verdict that was changed after it had become final; the operator's reason stands before it. Earlier versions
+/// began the cause with it.
 pub const CHANGED: &str = "changed by the operator";
 
 /// Rule for a trial in which the robot bounces on after its landing.

@@ -109,7 +109,20 @@ impl TrialRecord {
     pub fn is_overruled(&self) -> bool {
         let otherwise =
             self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
-        otherwise || self.cause.starts_with(CHANGED)
+        otherwise || self.changed_because().is_some()
+    }
+
+    /// Returns the operator's reason of the last change of the verdict, and the rest of the cause; none where it was not changed.
+    pub fn changed_because(&self) -> Option<(&str, String)> {
+        let change = format!("{CHANGED}, was ");
+        if let Some(rest) = self.cause.strip_prefix(&change) {
+            // As earlier versions have written it.
+            let (before, rest) = rest.split_once(": ")?;
+            let (reason, rest) = rest.split_once("; ").unwrap_or((rest, ""));
+            return Some((reason, format!("{change}{before}; {rest}")));
+        }
+        let (reason, _) = self.cause.split_once(&format!("; {change}"))?;
+        Some((reason, self.cause[reason.len() + 2..].to_owned()))
     }
 
     /// Returns the number of repeats that count.

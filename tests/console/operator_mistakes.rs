@@ -263,7 +263,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     replay.send("2");
     replay.send("\x1b[H");
     replay.resize(200, 60);
-    replay.wait_for(&["was accept: the mat moved", "foot slipped on the mat"]);
+    replay.wait_for(&["the mat moved; changed by the operator", "foot slipped on the mat"]);
     replay.send("q");
     assert!(replay.wait().success());
 }

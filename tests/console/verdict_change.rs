@@ -61,7 +61,10 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
     let study = study_in(folder.path());
     let table = std::fs::read_to_string(study.join("trials.csv")).expect("trials.csv");
     let row = table.lines().nth(1).expect("trial 0");
-    assert!(row.contains(",fall,") && row.contains("was accept: it lay on its back"), "{table}");
+    assert!(
+        row.contains(",fall,") && row.contains("it lay on its back; changed by the operator, was accept"),
+        "{table}"
+    );
     let journal = std::fs::read_to_string(study.join("study.log")).expect("the journal");
     let change = journal.lines().find(|line| line.contains("verdict:0")).expect("the change");
     for part in ["\"old_verdict\"", "\"accept\"", "it lay on its back", "\"old_value\""] {

@@ -273,7 +273,7 @@ fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
     assert!(after.revision > before.revision, "the approval of an earlier card would be refused");
     let row = experiment.row(first).unwrap();
     assert_eq!((row.verdict, row.value), (Some(Verdict::Fall), Some(0.0)));
-    assert!(row.cause.starts_with("changed by the operator, was accept: it lay on its back; "), "{}", row.cause);
+    assert!(row.cause.starts_with("it lay on its back; changed by the operator, was accept; "), "{}", row.cause);
     assert_eq!(experiment.best().unwrap().trial, second);
     experiment.change_verdict(first, Verdict::Void, "the mat slid").unwrap();
     assert_eq!((experiment.counted(), experiment.row(first).unwrap().value), (1, None));

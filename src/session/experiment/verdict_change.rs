@@ -37,7 +37,8 @@ impl Experiment {
         if verdict != Verdict::Void && value.is_none() {
             return not_now(format!("nothing was measured in trial {trial}: it cannot be accepted"));
         }
-        let cause = format!("{CHANGED}, was {}: {reason}; {}", before.name(), row.cause);
+        // The operator's reason first: a long line is cut.
+        let cause = format!("{reason}; {CHANGED}, was {}; {}", before.name(), row.cause);
         let change = VerdictChange {
             at: Timestamp::now().to_string(),
             verdict: verdict.name().to_owned(),

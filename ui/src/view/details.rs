@@ -17,8 +17,13 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     if let Some(suggested) = trial.suggested {
         row("suggested", suggested.name().to_owned());
     }
-    if !trial.cause.is_empty() {
-        row("cause", trial.cause.clone());
+    match trial.changed_because() {
+        Some((reason, cause)) => {
+            row("reason", reason.to_owned());
+            row("cause", cause);
+        }
+        None if !trial.cause.is_empty() => row("cause", trial.cause.clone()),
+        None => {}
     }
     let use_of = |value: f64| match trial.verdict {
         Some(_) => format!("{value:.4} {unit}, reported to the optimizer"),
