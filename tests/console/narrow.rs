@@ -44,9 +44,9 @@ fn the_numbers_of_repeated_points_have_names_at_80_columns() {
     // On a wide terminal each line has its words.
     assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["2/2 landed  0.442 m ±0.050  leads, 96 %"]);
     // Regression: the lines of all points looked like statistics of the best.
-    assert_shows(&screen, &["*best 0.520 rad (#12)"]);
+    assert_shows(&screen, &["* best 0.520 rad (#12)"]);
     let title = "repeated points; *: that of the best";
-    assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["*best 0.520 m (#12)", title, "*#12", " #30"]);
+    assert_shows(&repeated("m", Some(0.96)).screen(200, 60), &["* best 0.520 m (#12)", title, "*#12", " #30"]);
     // A study without repeats has no such line.
     let mut console = repeated("m", None);
     console.record(Record::Points(Vec::new()));
