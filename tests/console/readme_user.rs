@@ -1,0 +1,265 @@
+//! Further answers and screens that a user of the README alone took for wrong.
+
+use crate::support::{Console, assert_shows, line_with, proposal, tick, trial};
+use quadfrog::recording::record::{LogLevel, LogRecord, Record, RequestRecord, StageRecord, Transition};
+use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::telemetry::{Fault, Mode, Phase, TransitionCause};
+use quadfrog::trial::{
+    ExperimentStage, FallRisk, PointRecord, Proposal, ProposalSource, QueuedPoint, SearchStatus, TrialRecord, Verdict,
+};
+use quadfrog_console::message::{Effect, Msg, ReplayCommand, ReplayStatus, ReplayTimeline};
+
+fn change(console: &mut Console, to: Mode, cause: &TransitionCause) {
+    let from = console.model.mode();
+    console.record(Record::Transition(Transition { from, to, cause: cause.to_string() }));
+    console.mode_of_ticks(to);
+}
+
+/// The last line of the screen.
+fn last(console: &Console, columns: u16) -> String {
+    console.screen(columns, 24).lines().last().unwrap_or_default().to_owned()
+}
+
+/// Regression: the reason was in the log alone and no warning there; Live kept the warning before it.
+#[test]
+fn live_says_why_the_robot_sat_down_until_the_operator_does_something() {
+    let reason = "the robot sat down: operator lost: no heartbeat of the operator's console for 1002 ms";
+    let mut console = Console::ready();
+    change(&mut console, Mode::SitDown, &TransitionCause::Fault(Fault::OperatorLost { silent_ms: 1002 }));
+    change(&mut console, Mode::Disarmed, &TransitionCause::StepFinished);
+    assert_eq!(console.said(), reason);
+    // Neither a later report nor a look at other views removes it.
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    console.press(&["2", "1"]);
+    console.wait(6_000);
+    assert_shows(&console.screen(80, 24).replace("\n ", " "), &[reason]);
+    console.press(&["6", "F"]);
+    assert_shows(&console.screen(120, 24), &["warnings and errors", "operator lost: no heartbeat"]);
+    assert!(line_with(&console.screen(120, 24), "SIT DOWN: operator lost").contains("W "));
+    console.press(&["1"]);
+    let accepted = RequestRecord { request: "accept".into(), accepted: true, answer: "trial 0".into() };
+    console.record(Record::Request(accepted));
+    console.wait(20_000);
+    assert!(!console.said().contains("sat down"), "{}", console.said());
+}
+
+#[test]
+fn a_robot_that_sits_down_for_the_operator_needs_no_reason() {
+    for cause in [TransitionCause::Command, TransitionCause::Fault(Fault::OperatorLeft)] {
+        let mut console = Console::ready();
+        change(&mut console, Mode::SitDown, &cause);
+        console.wait(6_000);
+        assert!(!console.said().contains("sat down"), "{}", console.said());
+    }
+    let mut console = Console::ready();
+    change(&mut console, Mode::SitDown, &TransitionCause::Idle { allowed_s: 60.0 });
+    assert_eq!(console.said(), "the robot sat down: idle: no approval or verdict for 60 s");
+}
+
+/// Regression: `best` was the best before the playhead.
+#[test]
+fn the_best_of_a_replay_is_that_of_the_recording() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let best = |console: &mut Console, best| {
+        let trials = quadfrog::recording::timeline::TrialRun { trial: 7, begin_ns: 1, impulse_ns: None, end_ns: 2 };
+        let timeline = ReplayTimeline { trials: vec![trials], best, ..ReplayTimeline::default() };
+        console.update(Msg::Timeline(Box::new(timeline)));
+        console.press(&["G", "b", "e", "s", "t", "Enter"])
+    };
+    assert_eq!(best(&mut console, Some(7)), [Effect::Replay(ReplayCommand::Trial(7))]);
+    assert_eq!(best(&mut console, None), []);
+    assert_shows(&console.screen(80, 24), &["the recording has no accepted trial"]);
+    console.press(&["Esc"]);
+    assert_eq!(best(&mut console, Some(3)), []);
+    assert_shows(&console.screen(80, 24), &["the best is trial 3, which is not in this recording"]);
+    console.press(&["Esc", "G"]);
+    assert_shows(&console.screen(80, 24), &["or best of the recording"]);
+}
+
+/// Two judged trials with signals, and trial 2 proposed.
+fn with_two_jumps() -> Console {
+    let mut console = Console::ready();
+    for (number, verdict) in [(0, Verdict::Accept), (1, Verdict::Fall)] {
+        for time_ms in (0..1500).step_by(5) {
+            let time_s = time_ms as f64 / 1000.0 - 0.5;
+            let phase = if time_s < 0.0 { Phase::Stance } else { Phase::Flight };
+            console.tick(tick(u64::from(number) * 5000 + time_ms, 0.1, Some((number, time_s, phase))));
+        }
+        console.record(Record::Trial(trial(number, Some(verdict), None)));
+    }
+    console.ticks(9_000..9_100, |_| 0.0);
+    console.record(Record::Proposal(proposal(2, 0)));
+    console.stage(ExperimentStage::Proposed, 2);
+    console
+}
+
+/// Regression: the last line of Trials named no key of the selected row.
+#[test]
+fn the_last_line_of_trials_names_the_keys_of_the_row() {
+    let mut console = with_two_jumps();
+    console.press(&["2", "Home"]);
+    assert_eq!(last(&console, 80), " Press g twice to jump. · Enter open · c compare · f v judge · r re-run · ? more");
+    assert_shows(&last(&console, 120), &["r re-run · o override"]);
+    console.press(&["Down"]);
+    assert_shows(&last(&console, 80), &["a v judge"]);
+    console.mode(Mode::Disarmed);
+    assert_eq!(last(&console, 80), " Press A to arm. · Enter open · c compare · a v judge · r re-run · ? more");
+    assert_shows(&last(&console, 120), &["Press A to arm: the robot stands up. · Enter open"]);
+    // While a trial runs its row is no row of a verdict.
+    console.mode(Mode::Jump);
+    console.stage(ExperimentStage::Running, 2);
+    assert_eq!(last(&console, 80), " Jumping. · Enter open · c compare · r re-run");
+    console.press(&["1"]);
+    assert!(!last(&console, 80).contains("open"), "{}", last(&console, 80));
+}
+
+/// A verdict that waits comes before the row.
+#[test]
+fn a_verdict_that_waits_comes_before_the_keys_of_the_row() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.press(&["2"]);
+    let last = last(&console, 120);
+    assert!(last.find("a accept (suggested)") < last.find("Enter open"), "{last}");
+}
+
+/// Regression: neither the answer to the first `c` nor the comparison named the next key.
+#[test]
+fn the_keys_of_a_comparison_are_named() {
+    let mut console = with_two_jumps();
+    console.press(&["2", "Home", "c"]);
+    assert_eq!(
+        console.said(),
+        "trial 0 is laid under the charts of a jump; c on another row of Trials compares the two"
+    );
+    console.press(&["Down", "c"]);
+    let said = "A is trial 0, B is trial 1: 1 shows both in Live; there Left and Right move the cursor, Esc ends it";
+    assert_eq!(console.said(), said);
+    console.press(&["1"]);
+    assert_shows(&last(&console, 80), &["Esc end comparison", "Left Right cursor"]);
+    console.press(&["Esc"]);
+    assert!(console.model.live.comparison.is_none());
+    assert!(!last(&console, 120).contains("comparison"), "{}", last(&console, 120));
+}
+
+/// Regression: the reason stood between the old cause and the old verdict, and was cut.
+#[test]
+fn the_reason_of_a_changed_verdict_comes_first_and_whole() {
+    let reason = "the video shows that the left hind foot slid off the mat, and that the cable pulled the trunk to the side \
+                  before it landed";
+    let cause = format!("{reason}; changed by the operator, was accept; landed and settled");
+    // As earlier versions have written it.
+    let before = format!("changed by the operator, was accept: {reason}; landed and settled");
+    for cause in [cause, before] {
+        let mut console = Console::ready();
+        console.record(Record::Trial(TrialRecord { cause, ..trial(0, Some(Verdict::Void), None) }));
+        for (columns, rows) in [(80, 24), (120, 40)] {
+            console.update(Msg::Resize(columns, rows));
+            console.press(&["2", "Enter"]);
+            let screen = console.screen(columns, rows);
+            assert!(line_with(&screen, "reason").contains("the video shows that"), "{screen}");
+            let text = screen.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+            let cause = "cause changed by the operator, was accept; landed and settled";
+            assert_shows(&text, &[&format!("reason {reason} {cause}")]);
+            console.press(&["Esc"]);
+        }
+    }
+}
+
+/// Regression: the question about a re-run sounded as if it was queued already.
+#[test]
+fn questions_say_what_will_happen() {
+    let mut console = with_two_jumps();
+    console.press(&["2", "Home", "r"]);
+    let asked = "The parameters of trial #0 will be the proposal; the sampler's follows them.";
+    assert_shows(&console.screen(80, 24), &[asked]);
+    console.press(&["Esc", "n"]);
+    assert_shows(&console.screen(80, 24), &["Trial #2 will not be run"]);
+}
+
+/// Regression: `*best` looked like a misprint.
+#[test]
+fn the_sign_of_the_best_stands_apart_from_its_word() {
+    let mut console = Console::ready();
+    console.judged(1);
+    let point = PointRecord { trials: vec![0, 5], mean: 0.4, without_fall: 2, ..PointRecord::default() };
+    console.record(Record::Points(vec![point]));
+    console.stage(ExperimentStage::Finished, 5);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        assert_shows(&console.screen(columns, rows), &["* best 0.400 m (#0)"]);
+    }
+}
+
+/// Regression: the queue showed six digits without units.
+#[test]
+fn queued_points_have_the_digits_and_units_of_the_card() {
+    let mut console = Console::ready();
+    let parameters = vec![("f0".into(), 1.234_567), ("Fx".into(), 90.0), ("Fz".into(), 240.123)].into();
+    let gains = vec![("kp".into(), 450.0)].into();
+    let point = QueuedPoint { trial: 3, source: ProposalSource::Queued, parameters, gains, ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
+    console.press(&["N"]);
+    assert_shows(
+        &console.screen(120, 40),
+        &["#3    queued          f0 1.235 Hz, Fx 90.00 N, Fz 240.1 N, kp 450.0 N/m"],
+    );
+}
+
+/// Regression: "0 of the 1 nearest fell".
+#[test]
+fn the_falls_near_a_proposal_are_named_in_their_number() {
+    for (falls, neighbours, text) in [
+        (0, 1, "the nearest trial stood"),
+        (1, 1, "the nearest trial fell"),
+        (0, 5, "none of the 5 nearest trials fell"),
+        (2, 5, "2 of the 5 nearest trials fell"),
+        (5, 5, "all 5 nearest trials fell"),
+    ] {
+        let mut console = Console::ready();
+        let risk = Some(FallRisk { falls, neighbours, nearest_fall: None, nearest_fall_trial: None });
+        console.record(Record::Proposal(Proposal { risk, ..proposal(0, 1) }));
+        assert_shows(&console.screen(120, 40), &[text]);
+        console.record(Record::Trial(TrialRecord { risk, ..trial(0, Some(Verdict::Accept), None) }));
+        console.press(&["2", "Enter"]);
+        assert_shows(&console.screen(120, 40), &[&format!("risk before    {text}")]);
+    }
+}
+
+/// Regression: the sentence about the nearest fall took three lines, and the chart of J lost its axis.
+#[test]
+fn the_nearest_fall_leaves_the_chart_its_axis() {
+    let mut console = Console::ready();
+    console.judged(2);
+    let with = |console: &mut Console, risk| {
+        console.record(Record::Proposal(Proposal { risk, ..proposal(2, 1) }));
+        console.stage(ExperimentStage::Proposed, 2);
+        console.screen(80, 24)
+    };
+    // Below a message of two lines, too.
+    let long = "a report of the session that is longer than the eighty columns of a small terminal are wide";
+    console.record(Record::Log(LogRecord { level: LogLevel::Warning, source: "test".into(), message: long.into() }));
+    for (falls, text) in [(0, "none of the 5 nearest trials"), (2, "2 of the 5 nearest trials fell;")] {
+        let risk = FallRisk { falls, neighbours: 5, nearest_fall: Some(0.25), nearest_fall_trial: Some(12) };
+        let screen = with(&mut console, Some(risk));
+        assert_shows(&screen, &[text, "nearest fall #12 at 0.25", "columns of a small", "#19"]);
+    }
+}
+
+/// Regression: the key that ends a confirmation made the last verdict final without a word.
+#[test]
+fn the_end_of_a_confirmation_is_asked_for() {
+    let mut console = Console::ready();
+    for (number, verdict) in [(0, Some(Verdict::Accept)), (1, None), (1, Some(Verdict::Accept))] {
+        console.record(Record::Trial(trial(number, verdict, None)));
+    }
+    console.record(Record::Search(SearchStatus { confirming: Some(4), ..SearchStatus::default() }));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 2, can_undo: true, jumps: 0 }));
+    assert_eq!(console.requests(&["K"]), []);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["End the repeats?", "4 repeats will not be run", "Press y to end the repeats"]);
+    assert_shows(&screen, &["The verdict of trial #1 then stays: u does not take it back any longer."]);
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_eq!(console.said(), "cancelled: the repeats go on");
+    assert_eq!(console.requests(&["K", "y"]), [OperatorRequest::ConfirmBest { repeats: 0 }]);
+}
