@@ -124,6 +124,18 @@ fn a_verdict_that_waits_comes_before_the_keys_of_the_row() {
     assert!(last.find("a accept (suggested)") < last.find("Enter open"), "{last}");
 }
 
+/// Of another row only the keys are named that are accepted while a trial waits.
+#[test]
+fn while_a_trial_waits_the_other_rows_can_be_opened_and_compared() {
+    let mut console = with_two_jumps();
+    console.record(Record::Trial(trial(2, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 2);
+    console.mode(Mode::Review);
+    console.press(&["2", "Home"]);
+    let keys = " Trial 2 waits for its verdict: press 1. · Enter open · c compare · ? more";
+    assert_eq!(last(&console, 80), keys);
+}
+
 /// Regression: neither the answer to the first `c` nor the comparison named the next key.
 #[test]
 fn the_keys_of_a_comparison_are_named() {

@@ -214,7 +214,8 @@ fn review(model: &Model) -> NextStep {
     if let (Err(_), Some(waiting)) = (waiting_trial_is_meant(model), model.session.under_review()) {
         let live = model.keymap.key(Action::LiveView);
         let lead = format!("Trial {} waits for its verdict: select its row or press {live}.", waiting.trial);
-        return step(lead, model, &[(Action::SitDown, "sit down"), (Action::Quit, "quit")]);
+        let short = format!("Trial {} waits for its verdict: press {live}.", waiting.trial);
+        return NextStep { short, ..step(lead, model, &[(Action::SitDown, "sit down"), (Action::Quit, "quit")]) };
     }
     let verdicts = [(Action::Accept, Verdict::Accept), (Action::Fall, Verdict::Fall), (Action::Void, Verdict::Void)];
     let (first, others): (Vec<_>, Vec<_>) = verdicts.into_iter().partition(|(_, verdict)| Some(*verdict) == suggested);
