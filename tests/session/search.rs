@@ -373,6 +373,7 @@ fn equal_repeats_give_no_confidence() {
 }
 
 /// The answer to a moved point names its values and its place: its number is that of the place.
+/// In this study every parameter has the unit N.
 #[test]
 fn a_moved_point_is_named_by_its_values_and_its_place() {
     let mut experiment = experiment(20);
@@ -382,10 +383,10 @@ fn a_moved_point_is_named_by_its_values_and_its_place() {
     let moved = experiment.move_queued(1, false).unwrap();
     assert_eq!(
         (experiment.in_words(&moved.point), moved.place, moved.of),
-        ("f0 1.200 Hz, Fx 60.00 N, Fz 250.0 N".to_owned(), 3, 3)
+        ("f0 1.200 N, Fx 60.00 N, Fz 250.0 N".to_owned(), 3, 3)
     );
     let moved = experiment.move_queued(1, true).unwrap();
-    assert_eq!((experiment.in_words(&moved.point), moved.place), ("f0 1.300 Hz, Fx 60.00 N, Fz 250.0 N".to_owned(), 1));
+    assert_eq!((experiment.in_words(&moved.point), moved.place), ("f0 1.300 N, Fx 60.00 N, Fz 250.0 N".to_owned(), 1));
 }
 
 /// Regression: the answer to a re-run from the table did not say that it is the proposal at once.
