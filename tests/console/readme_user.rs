@@ -145,6 +145,8 @@ fn the_keys_of_a_comparison_are_named() {
         console.said(),
         "trial 0 is laid under the charts of a jump; c on another row of Trials compares the two"
     );
+    let keys = " Press g twice to jump. · Enter open · c clear · f v judge · r re-run · ? more";
+    assert_eq!(last(&console, 80), keys);
     console.press(&["Down", "c"]);
     let said = "A is trial 0, B is trial 1: 1 shows both in Live; there Left and Right move the cursor, Esc ends it";
     assert_eq!(console.said(), said);

@@ -32,7 +32,7 @@ fn of_row(model: &Model) -> Vec<(String, String)> {
     let mut keys = vec![(key(Action::Open), open.to_owned())];
     if model.history.trace(trial).is_some() {
         let same = model.live.comparison.is_none() && model.live.ghost == Some(trial);
-        keys.push((key(Action::Ghost), if same { "not under charts" } else { "compare" }.to_owned()));
+        keys.push((key(Action::Ghost), if same { "clear" } else { "compare" }.to_owned()));
     }
     // The step itself names the verdicts of a trial that waits.
     if model.session.under_review().is_some() {
