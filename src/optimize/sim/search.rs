@@ -11,9 +11,9 @@ use libm::{exp, expm1, log, pow, sqrt};
 use std::cmp::Ordering;
 
 /// lambda: price of a fall, as a share of the incumbent's value.
-const PRICE: f64 = 0.1;
+const PRICE: f64 = 0.05;
 /// Factor of the price for each fall in a row.
-const ESCALATION: f64 = 3.0;
+const ESCALATION: f64 = 10.0;
 /// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
 const INCUMBENT: f64 = 0.5;
 /// Probability of standing from which a point is sure enough to be proposed where no gain is worth its risk.
@@ -54,7 +54,7 @@ pub struct Acquisition<'a> {
     star: f64,
     /// The value of a fall, scaled: 0, or the lowest value of the worlds where values are negative.
     origin: f64,
-    /// 3^c
+    /// 10^c for c falls in a row.
     escalation: f64,
     void: Vec<Vec<f64>>,
 }
@@ -134,7 +134,7 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
     }
 
-    /// U = P EI - lambda 3^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points with U <= 0 the one
+    /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points with U <= 0 the one
     /// of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that stands makes points beyond it
     /// sure. Of the others the surest is the best. Near void points the merit is reduced.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
