@@ -337,7 +337,11 @@ fn name(axis: &Axis, ticks: &[f64], value: f64) -> String {
     match axis.names.iter().find(|(at, _)| (at - value).abs() < 1e-9) {
         Some((_, name)) => printable(name),
         None if !axis.names.is_empty() => String::new(),
-        None => format!("{value:.*}", decimals(ticks)).replace("-0.0", "0.0").replace('-', "\u{2212}"),
+        None => {
+            let text = format!("{value:.*}", decimals(ticks));
+            let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+            text.replace('-', if is_zero { "" } else { "\u{2212}" })
+        }
     }
 }
 

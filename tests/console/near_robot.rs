@@ -144,6 +144,13 @@ fn arming_says_that_a_robot_which_needs_no_approval_jumps() {
             &["The robot will stand up and jump without a question.", "arm: it stands up and jumps"],
         );
         assert_eq!(stands, "Standing up; the robot then jumps without a question.");
+        // Regression: after an interruption nothing said that the rule goes on.
+        let mut console = Console::ready();
+        console.record(Record::Session(SessionInfo { approve, backend: Some(Backend::Simulator), ..session() }));
+        assert_eq!(
+            console.screen(80, 24).lines().last().unwrap().trim_end().split(" ·").next(),
+            Some(" Press g twice to jump; the next ones follow without a question.")
+        );
     }
     for (approve, backend) in [(Approval::Each, Backend::Simulator), (Approval::FallsOnly, Backend::Hardware)] {
         let (arm, question, stands) = armed(approve, backend);

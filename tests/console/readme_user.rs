@@ -277,3 +277,27 @@ fn the_end_of_a_confirmation_is_asked_for() {
     assert_eq!(console.said(), "cancelled: the repeats go on");
     assert_eq!(console.requests(&["K", "y"]), [OperatorRequest::ConfirmBest { repeats: 0 }]);
 }
+
+/// Regression: the details of a trial at whose begin the playhead of a replay stood said that it was not judged, and nothing opened
+/// those of the last trial.
+#[test]
+fn the_details_of_a_replay_are_those_of_the_whole_recording() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    console.model.snapshot.tick = tick(100, 0.0, Some((4, 0.0, Phase::Stance)));
+    let running = TrialRecord { value: None, measured: None, cause: String::new(), ..trial(4, None, None) };
+    console.record(Record::Trial(running));
+    console.stage(ExperimentStage::Running, 4);
+    let judged = TrialRecord { cause: "landed and settled".into(), ..trial(4, Some(Verdict::Accept), None) };
+    let later = trial(5, Some(Verdict::Fall), None);
+    let span = quadfrog::recording::timeline::TrialRun { trial: 4, begin_ns: 1, impulse_ns: None, end_ns: 2 };
+    let rows = [judged, later].into_iter().map(|row| (row.trial, row)).collect();
+    let timeline = ReplayTimeline { trials: vec![span], rows, ..ReplayTimeline::default() };
+    console.update(Msg::Timeline(Box::new(timeline)));
+    console.press(&["2", "Home", "Enter"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["Trial #4", "accept", "landed and settled"]);
+    assert!(!screen.contains("not judged") && !screen.contains("no end so far"), "{screen}");
+    console.press(&["Down"]);
+    assert_shows(&console.screen(120, 40), &["Trial #5", "fall"]);
+}

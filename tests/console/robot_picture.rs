@@ -128,6 +128,28 @@ fn the_path_and_both_landing_spots_are_shown_after_the_landing() {
     assert!(first_row(&picture, |cell| cell.fg == path) < first_row(&picture, |cell| cell.fg == trunk));
 }
 
+/// Regression: a robot that rolled on after its fall was drawn beyond the right edge.
+#[test]
+fn a_robot_that_rolls_on_after_its_trial_stays_in_the_picture() {
+    let mut console = Console::ready();
+    console.model.robot = Some(RobotDescription::embedded("go1").expect("the robot"));
+    for step in 0..200_u64 {
+        let share = step as f64 / 199.0;
+        show(&mut console, standing(1000 + 5 * step, [0.8 * share, 0.0, 0.3], Some((0, share, Phase::Flight))));
+    }
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Fall))));
+    console.stage(ExperimentStage::Review, 0);
+    console.mode(Mode::Damped);
+    let trunk = console.model.theme.style(quadfrog_console::theme::Role::SeriesA).fg.unwrap();
+    let trunk_cells = |console: &Console| picture(console).iter().flatten().filter(|cell| cell.fg == trunk).count();
+    show(&mut console, standing(2001, [0.8, 0.0, 0.1], None));
+    let before = trunk_cells(&console);
+    show(&mut console, standing(2500, [1.9, 0.0, 0.1], None));
+    let drawn = picture(&console);
+    assert!(trunk_cells(&console) * 3 > before, "{before} cells before:\n{}", symbols(&drawn));
+    assert!(drawn.iter().all(|row| row.last().is_none_or(|cell| cell.fg != trunk)), "{}", symbols(&drawn));
+}
+
 /// A console on a ground, before the first trial.
 fn on_ground(change: impl Fn(&mut Config)) -> Console {
     let mut config = Config::load(None).expect("the built-in configuration");

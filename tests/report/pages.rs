@@ -49,6 +49,17 @@ fn a_figure_is_a_well_formed_svg_with_the_unit_of_every_axis() {
     assert!(!drawn.contains("NaN") && !drawn.contains("inf") && !drawn.contains('\u{1b}'));
 }
 
+/// Regression: ticks between -0.1 and 0 had lost their sign.
+#[test]
+fn the_labels_of_a_narrow_axis_keep_their_sign() {
+    let mut roll = Panel::new("", Axis::new("Time", "s"), Axis::new("Roll", "rad"));
+    roll.series.push(Series::line("", 0, [[0.0, -0.045], [1.0, 0.045]]));
+    let drawn = svg::draw(&Figure::new("roll", "", 1, [roll]));
+    for label in ["\u{2212}0.04", "\u{2212}0.02", "0.00", "0.02", "0.04"] {
+        assert_eq!(drawn.matches(&format!("\n{label}\n")).count(), 1, "{label}");
+    }
+}
+
 #[test]
 fn no_two_styles_look_the_same_without_colour() {
     for a in 0..7 {

@@ -379,6 +379,12 @@ impl Model {
         rows.filter(|row| !self.session.trials.records.contains_key(&row.trial))
     }
 
+    /// The row of a trial for its details: in a replay the newest of the whole recording.
+    pub fn as_recorded(&self, trial: u32) -> Option<&TrialRecord> {
+        let recorded = self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
+        recorded.or_else(|| self.session.trials.records.get(&trial))
+    }
+
     /// Whether a trial lies after the playhead of a replay.
     pub fn is_later(&self, trial: u32) -> bool {
         !self.session.trials.records.contains_key(&trial)

@@ -42,10 +42,13 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("repeats", repeats);
     }
     if let Some(ran) = session.trials.ran.get(&trial.trial) {
-        let took = ran.ended_ns.map_or("no end so far".to_owned(), |ended| {
-            format!("took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9)
-        });
-        row("ran", format!("at {} of the session, {took}", clock(ran.begun_ns)));
+        let took = match ran.ended_ns {
+            Some(ended) => format!(", took {:.1} s", ended.saturating_sub(ran.begun_ns) as f64 / 1e9),
+            // In a replay the trial at the playhead has its verdict before its end.
+            None if trial.verdict.is_some() => String::new(),
+            None => ", no end so far".to_owned(),
+        };
+        row("ran", format!("at {} of the session{took}", clock(ran.begun_ns)));
     } else if trial.verdict.is_some() {
         row("ran", if trial.was_not_run() { "not at all" } else { "not in this session" }.to_owned());
     }
@@ -67,12 +70,15 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         row("displacement", format!("{:+.4} m forward, {:+.4} m left", m.dx_m, m.dy_m));
         row("turn", format!("{:+.4} rad", m.dyaw_rad));
         row("rise, air", format!("{:.4} m, {:.3} s", m.apex_m, m.air_s));
-        if let Some(at) = m.touchdown {
-            let Displacement { time_s, dx_m, dy_m, dyaw_rad } = at;
-            row(
+        match m.touchdown {
+            Some(Displacement { time_s, dx_m, dy_m, dyaw_rad }) => row(
                 "touchdown",
                 format!("at {time_s:.3} s, {dx_m:+.4} m forward, {dy_m:+.4} m left, turned {dyaw_rad:+.4} rad"),
-            );
+            ),
+            None if m.air_s > 0.0 && m.flights == 0 => {
+                row("touchdown", "none after the impulse: the feet were down before its end".to_owned());
+            }
+            None => {}
         }
         if m.flights > 1 {
             row("bounced", format!("{} flights after the impulse", m.flights));

@@ -185,9 +185,11 @@ fn live(model: &Model) -> NextStep {
         }
         Mode::Ready if session.open_proposal().is_some() => {
             let approve = key(Action::Approve);
-            let lead = match session.info.is_hardware() {
-                true => format!("Press {approve} to jump: y confirms the area, {approve} again jumps."),
-                false => format!("Press {approve} twice to jump."),
+            let lead = match (session.info.is_hardware(), session.jumps_without_question()) {
+                (true, _) => format!("Press {approve} to jump: y confirms the area, {approve} again jumps."),
+                // An interruption has paused the rule.
+                (false, true) => format!("Press {approve} twice to jump; the next ones follow without a question."),
+                (false, false) => format!("Press {approve} twice to jump."),
             };
             let short = if session.info.is_hardware() { format!("Press {approve} to jump.") } else { String::new() };
             NextStep { short, ..step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down]) }

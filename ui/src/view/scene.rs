@@ -15,6 +15,8 @@ use crate::model::history::ChartSample;
 const GRID: f64 = 0.5;
 /// A robot farther from the begin of its trial has been carried, m.
 const CARRIED: f64 = 2.0;
+/// Steps in which the picture gets wider with a robot that moves out of it, m.
+const FRAME_STEP: f64 = 0.1;
 /// Samples between two dots of a path.
 const PATH_STEP: usize = 6;
 
@@ -113,9 +115,9 @@ impl<'a> Scene<'a> {
         Scene { start, ground, path, feet, best, apex }
     }
 
-    /// The displacement for which there is room in the picture: of the best trial, before there is one a usual one, or of the
-    /// present trial if that is longer.
-    pub fn framed_jump(&self, task: Option<Task>) -> Vector3<f64> {
+    /// The displacement for which there is room in the picture: of the best trial, before there is one a usual one, or that of the
+    /// present trial or of the `trunk` now if it is longer: a robot that fell rolls on after the trial.
+    pub fn framed_jump(&self, task: Option<Task>, trunk: &Vector3<f64>) -> Vector3<f64> {
         let usual = match task {
             Some(Task::Forward) => Vector3::new(0.5, 0.0, 0.0),
             Some(Task::LateralLeft) => Vector3::new(0.0, 0.3, 0.0),
@@ -123,8 +125,14 @@ impl<'a> Scene<'a> {
             Some(Task::TwistCcw | Task::TwistCw) | None => Vector3::zeros(),
         };
         let expected = self.best.unwrap_or(usual);
-        let present = self.path.last().copied().unwrap_or_default();
-        if present.xy().norm() > expected.xy().norm() { present } else { expected }
+        let landed = self.path.last().copied().unwrap_or_default();
+        let now = trunk.map(|length| steady(length, FRAME_STEP));
+        [landed, now].into_iter().fold(
+            expected,
+            |longest, jump| {
+                if jump.xy().norm() > longest.xy().norm() { jump } else { longest }
+            },
+        )
     }
 
     /// The point of the plane of the ground at a place.

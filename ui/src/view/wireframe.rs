@@ -122,7 +122,8 @@ pub fn render(frame: &mut Frame, panel: Rect, model: &Model) {
 pub fn drawing(area: Rect, row_height: f64, model: &Model) -> Option<Drawing> {
     let (tick, robot) = (&model.snapshot.tick, model.robot.as_ref().filter(|_| !model.robot_is_silent())?);
     let scene = Scene::of(model, robot);
-    let jump = scene.framed_jump(model.session.info.task);
+    let trunk = scene.start.place(tick.estimate.position_world).map(|length| steady(length, SMALLEST_LENGTH));
+    let jump = scene.framed_jump(model.session.info.task, &trunk);
     let half_width = REACH + jump.xy().norm() / 2.0;
     let top = TOP.max(scene.apex + ABOVE_TRUNK);
     let target = Vector3::new(jump.x / 2.0, jump.y / 2.0, (top + BOTTOM) / 2.0);
@@ -136,7 +137,6 @@ pub fn drawing(area: Rect, row_height: f64, model: &Model) -> Option<Drawing> {
     canvas.lines(Role::Quiet, 2, &scene.box_lines(&jump));
     let rpy = tick.estimate.roll_pitch_yaw.map(|angle| steady(angle, SMALLEST_ANGLE));
     let turned = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z - scene.start.yaw);
-    let trunk = scene.start.place(tick.estimate.position_world).map(|length| steady(length, SMALLEST_LENGTH));
     let of_body = |point: Vector3<f64>| turned * point + trunk;
     let legs_of = |legs: [Leg; 2]| -> Vec<[Vector3<f64>; 2]> {
         let angles = |leg| leg_of(&tick.state.joint_position_rad, leg).map(|angle| steady(angle, SMALLEST_ANGLE));

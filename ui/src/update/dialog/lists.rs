@@ -195,20 +195,20 @@ pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
 }
 
 pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize) -> Vec<Effect> {
-    let records = &model.session.trials.records;
+    let numbers = || model.session.trials.records.values().chain(model.later_trials()).map(|row| row.trial);
     let (neighbour, scroll) = match key.code() {
         KeyCode::PageUp => (None, scroll.saturating_sub(DETAILS_PAGE)),
         // The drawing stops at the last line.
         KeyCode::PageDown => (None, (scroll + DETAILS_PAGE).min(DETAILS_PAGE * 2)),
-        KeyCode::Up => (records.range(..trial).next_back(), 0),
-        KeyCode::Down => (records.range(trial + 1..).next(), 0),
+        KeyCode::Up => (numbers().filter(|number| *number < trial).max(), 0),
+        KeyCode::Down => (numbers().filter(|number| *number > trial).min(), 0),
         _ => {
             unknown_key(model, key, "Up Down PgUp PgDn");
             model.dialog = Some(Dialog::Details { trial, scroll });
             return Vec::new();
         }
     };
-    let trial = neighbour.map_or(trial, |(number, _)| *number);
+    let trial = neighbour.unwrap_or(trial);
     if matches!(key.code(), KeyCode::Up | KeyCode::Down) {
         // Keys act on the shown trial: as on a row of Trials.
         model.trial_table.selected = Some(trial);
