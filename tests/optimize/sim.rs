@@ -149,7 +149,8 @@ fn falls_where_every_simulated_robot_stands_are_learned() {
     let u = unit(&study, number);
     let mut before = first.expected.unwrap().p_stand;
     finish(&mut study, number, None);
-    for _ in 0..3 {
+    // After falls the proposals are far from the first point and say less about it.
+    for _ in 0..5 {
         let now = expected_at(&study, &u).p_stand;
         assert!(now < before, "{now} {before}");
         before = now;

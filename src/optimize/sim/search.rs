@@ -16,8 +16,10 @@ const PRICE: f64 = 0.05;
 const ESCALATION: f64 = 10.0;
 /// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
 const INCUMBENT: f64 = 0.5;
+/// Probability of standing below which no gain is worth the risk.
+const LEAST: f64 = 0.75;
 /// Probability of standing from which a point is sure enough to be proposed where no gain is worth its risk.
-const SURE: f64 = 0.85;
+const SURE: f64 = 0.8;
 /// Smallest J*, in scaled units.
 const LEAST_STAR: f64 = 1e-3;
 /// Half widths of the local rounds, as shares of the box.
@@ -66,7 +68,7 @@ enum Reason {
     Unsure,
     /// It stands, and its gain is not worth its risk: the one that may be the highest is the best.
     Sure,
-    /// Its gain is worth its risk: U > 0.
+    /// Its gain is worth its risk: U > 0 and P >= [`LEAST`].
     Gain,
 }
 
@@ -134,9 +136,9 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
     }
 
-    /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points with U <= 0 the one
-    /// of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that stands makes points beyond it
-    /// sure. Of the others the surest is the best. Near void points the merit is reduced.
+    /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not
+    /// worth their risk the one of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that
+    /// stands makes points beyond it sure. Of the others the surest is the best. Near void points the merit is reduced.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
         let prediction = self.predict(x, features);
         let PointPrediction { mean, variance, p_stand } = prediction;
@@ -146,7 +148,7 @@ impl<'a> Acquisition<'a> {
             Some(incumbent) => exp(log(deviation) + log_improvement((mean - incumbent) / deviation)),
         };
         let utility = p_stand * gain - PRICE * self.escalation * self.star * (1.0 - p_stand);
-        let (reason, merit) = if utility > 0.0 {
+        let (reason, merit) = if utility > 0.0 && p_stand >= LEAST {
             (Reason::Gain, utility)
         } else if p_stand >= SURE {
             (Reason::Sure, (mean + deviation - self.origin).max(0.0))
