@@ -19,7 +19,7 @@ const INCUMBENT: f64 = 0.5;
 /// Probability of standing below which no gain is worth the risk.
 const LEAST: f64 = 0.75;
 /// Probability of standing from which a point is sure enough to be proposed where no gain is worth its risk.
-const SURE: f64 = 0.8;
+const SURE: f64 = 0.85;
 /// Smallest J*, in scaled units.
 const LEAST_STAR: f64 = 1e-3;
 /// Half widths of the local rounds, as shares of the box.
