@@ -296,8 +296,30 @@ fn the_details_of_a_replay_are_those_of_the_whole_recording() {
     console.update(Msg::Timeline(Box::new(timeline)));
     console.press(&["2", "Home", "Enter"]);
     let screen = console.screen(120, 40);
-    assert_shows(&screen, &["Trial #4", "accept", "landed and settled"]);
+    assert_shows(&screen, &["Trial #4, at the end of the recording", "accept", "landed and settled"]);
     assert!(!screen.contains("not judged") && !screen.contains("no end so far"), "{screen}");
     console.press(&["Down"]);
     assert_shows(&console.screen(120, 40), &["Trial #5", "fall"]);
+}
+
+/// Regression: the question of a field stayed beside another one.
+#[test]
+fn an_override_says_nothing_of_the_field_that_was_left() {
+    let mut console = Console::ready();
+    console.press(&["o", "Down", "x", "Enter"]);
+    assert_shows(&console.screen(120, 40), &["a character was not taken; Enter again"]);
+    console.press(&["Down"]);
+    assert!(!console.screen(120, 40).contains("Enter again"), "{}", console.screen(120, 40));
+}
+
+/// Regression: the question before quitting did not say that the last verdict becomes final.
+#[test]
+fn quitting_says_that_the_last_verdict_stays() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
+    console.record(Record::Proposal(proposal(1, 0)));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    console.mode(Mode::Ready);
+    console.press(&["q"]);
+    assert_shows(&console.screen(80, 24), &["Quit?", "The verdict of trial #0 then stays; Trials changes it"]);
 }

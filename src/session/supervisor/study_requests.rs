@@ -13,7 +13,7 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
     let output = match request {
         OperatorRequest::Judge(verdict) => {
             let answer = format!(
-                "{trial}; u takes it back until the next trial is approved or skipped, or the best is confirmed"
+                "{trial}; u takes it back until the next trial is approved or skipped, the best is confirmed, or the session ends"
             );
             judged(experiment.judge(*verdict, false), answer)
         }

@@ -118,7 +118,9 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
         let line = Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)]);
         lines.extend(wrap(&line, inside, 15));
     }
-    render_lines(frame, area, model, (&format!("Trial #{trial}"), width, "PgUp PgDn"), lines, scroll);
+    let at_playhead = model.session.trials.records.get(&trial);
+    let time = if at_playhead == Some(record) { "" } else { ", at the end of the recording" };
+    render_lines(frame, area, model, (&format!("Trial #{trial}{time}"), width, "PgUp PgDn"), lines, scroll);
 }
 
 /// Draws an empty bordered box; returns its inside. Where Space types although the robot is energised, the frame has the

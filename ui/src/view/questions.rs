@@ -130,6 +130,9 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
         let (judged, budget) = (model.session.counted(), model.session.budget());
         lines.push(Line::from(format!("{judged} of {budget} trials count so far; --resume continues the study.")));
     }
+    if let Some(trial) = model.session.undoable() {
+        lines.push(Line::from(format!("The verdict of trial #{trial} then stays; Trials changes it later.")));
+    }
     lines.push(Line::default());
     lines.push(answers(&model.theme, "y", "quit"));
     lines

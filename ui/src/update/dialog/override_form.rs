@@ -74,6 +74,8 @@ impl OverrideForm {
 
     fn select(&mut self, selected: usize) {
         if self.take_typed() {
+            // What is said of another row is no longer meant.
+            self.problem = None;
             self.selected = selected.min(self.rows.len().saturating_sub(1));
         }
     }
