@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
 use super::player::{LostPart, Marker, MarkerKind, Played, Player};
-use super::record::{Record, SessionInfo, Stamped};
+use super::record::{Record, SessionInfo, StageRecord, Stamped};
 use super::session_files::recordings_in;
 use crate::telemetry::Mode;
 use crate::trial::{ExperimentStage, TrialRecord};
@@ -21,6 +21,8 @@ pub struct TrialRun {
     pub trial: u32,
     /// Its first tick, the countdown's, ns.
     pub begin_ns: u64,
+    /// The time from which its row is recorded, too: its begin, or the record of the session's thread where that is a little later, ns.
+    pub row_ns: u64,
     /// Begin of the impulse; none where the recording has no changes of mode.
     pub impulse_ns: Option<u64>,
     /// Its end: the review, its row, or the next trial, ns.
@@ -193,7 +195,7 @@ impl Timeline {
         let mut ended = vec![false; begins.len()];
         for (index, &(trial, begin_ns)) in begins.iter().enumerate() {
             let end_ns = begins.get(index + 1).map_or(duration_ns, |next| next.1);
-            spans.push(TrialRun { trial, begin_ns, impulse_ns: None, end_ns });
+            spans.push(TrialRun { trial, begin_ns, row_ns: begin_ns, impulse_ns: None, end_ns });
         }
         for part in &self.parts {
             for event in part.player.events() {
@@ -204,6 +206,12 @@ impl Timeline {
                 let span = &mut spans[index];
                 if matches!(&event.record, Record::Transition(change) if change.to == Mode::Jump) {
                     span.impulse_ns.get_or_insert(time_ns);
+                }
+                if let Record::Stage(StageRecord { stage: ExperimentStage::Running, trial, .. }) = event.record
+                    && trial == span.trial
+                    && !ended[index]
+                {
+                    span.row_ns = time_ns;
                 }
                 let ends = ended_trial(&event.record) == Some(span.trial);
                 if ends && !std::mem::replace(&mut ended[index], true) {

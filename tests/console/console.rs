@@ -42,6 +42,7 @@ mod output;
 mod parameters;
 mod prior;
 mod queue;
+mod readme_rules;
 mod readme_user;
 mod real_keys;
 mod recorded;

@@ -149,7 +149,7 @@ fn arming_says_that_a_robot_which_needs_no_approval_jumps() {
         console.record(Record::Session(SessionInfo { approve, backend: Some(Backend::Simulator), ..session() }));
         assert_eq!(
             console.screen(80, 24).lines().last().unwrap().trim_end().split(" ·").next(),
-            Some(" Press g twice to jump; the next ones follow without a question.")
+            Some(" Press g twice to jump. The next jumps follow without a question.")
         );
     }
     for (approve, backend) in [(Approval::Each, Backend::Simulator), (Approval::FallsOnly, Backend::Hardware)] {

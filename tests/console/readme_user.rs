@@ -63,7 +63,8 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus::default()));
     let best = |console: &mut Console, best| {
-        let trials = quadfrog::recording::timeline::TrialRun { trial: 7, begin_ns: 1, impulse_ns: None, end_ns: 2 };
+        let trials =
+            quadfrog::recording::timeline::TrialRun { trial: 7, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
         let timeline = ReplayTimeline { trials: vec![trials], best, ..ReplayTimeline::default() };
         console.update(Msg::Timeline(Box::new(timeline)));
         console.press(&["G", "b", "e", "s", "t", "Enter"])
@@ -290,7 +291,8 @@ fn the_details_of_a_replay_are_those_of_the_whole_recording() {
     console.stage(ExperimentStage::Running, 4);
     let judged = TrialRecord { cause: "landed and settled".into(), ..trial(4, Some(Verdict::Accept), None) };
     let later = trial(5, Some(Verdict::Fall), None);
-    let span = quadfrog::recording::timeline::TrialRun { trial: 4, begin_ns: 1, impulse_ns: None, end_ns: 2 };
+    let span =
+        quadfrog::recording::timeline::TrialRun { trial: 4, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
     let rows = [judged, later].into_iter().map(|row| (row.trial, row)).collect();
     let timeline = ReplayTimeline { trials: vec![span], rows, ..ReplayTimeline::default() };
     console.update(Msg::Timeline(Box::new(timeline)));

@@ -76,7 +76,7 @@ fn a_picture_for_paper_has_a_light_background_and_the_end_of_a_trial() {
     program.text(&best);
     let (drawn, background) = cells(&std::fs::read_to_string(program.path("a.svg")).unwrap(), 40);
     assert_eq!(background, "#ffffff");
-    assert!(drawn[38].contains("trial #12, suggested verdict: accept"), "{drawn:?}");
+    assert!(drawn[38].contains("trial #12, verdict by --approve auto: accept"), "{drawn:?}");
 }
 
 /// Regression: the recording had the checklist of the start of the session, not the one with which the robot was armed.

@@ -531,7 +531,7 @@ fn the_first_screen_names_every_key_that_a_newcomer_needs() {
             "STOP  Space F12",
             "Press A to arm",
             "o override",
-            "g approve; again after 0.8 s: the robot jumps",
+            "g approve the jump; again after 0.8 s: countdown and jump",
             "a accept   f fall   v void   r re-run",
             "q quit",
             "? all keys",

@@ -128,6 +128,11 @@ impl Action {
     pub fn info(self) -> &'static ActionInfo {
         &ACTIONS[self as usize]
     }
+
+    /// Whether it opens a view and does nothing else.
+    pub fn opens_view(self) -> bool {
+        self as usize >= Action::LiveView as usize && self as usize <= Action::PreviousView as usize
+    }
 }
 
 const fn row(

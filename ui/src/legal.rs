@@ -6,15 +6,19 @@ use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
 use ratatui::layout::Size;
 
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
-use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, MIN_COLUMNS, MIN_ROWS, shows_trial};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, MIN_COLUMNS, MIN_ROWS, areas, shows_trial};
 use crate::model::{Model, View};
 
 /// Whether an action is possible now; the reason if it is not.
 pub type Legality = Result<(), String>;
 
+/// Reason for which a replay, also that of a watched session that has ended, stops nothing.
+pub const NO_ROBOT_TO_STOP: &str = "this is a replay: there is no robot to stop";
+
 pub fn legal(action: Action, model: &Model) -> Legality {
     use Action as A;
     match action {
+        A::Stop => require(model.can_stop(), NO_ROBOT_TO_STOP),
         A::TakeControl => may_take_control(model),
         A::Arm => may_arm(model),
         A::SitDown => may_sit_down(model),
@@ -114,6 +118,13 @@ pub fn may_request(model: &Model) -> Legality {
     require(model.observer().is_none(), "this console only watches; of its keys STOP alone reaches the session")?;
     require(model.replay.is_none(), "this is a replay: there is nothing to command")?;
     require(!model.session.info.observe, "this session only observes")
+}
+
+/// Whether the keys of the views do not cancel a countdown: where simulated jumps follow each other without a question, and every
+/// view shows the countdown. On a robot, and before a jump that a person has approved one by one, any key cancels.
+pub fn view_keys_keep_countdown(model: &Model) -> bool {
+    let shown = areas(Size::from(model.size), model).is_some() && model.dialog.is_none();
+    shown && model.session.jumps_without_question()
 }
 
 /// Whether a stop can be acknowledged. An observer may acknowledge too, since an observer's STOP stops the robot.

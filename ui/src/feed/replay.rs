@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use quadfrog::engine::Observer;
 use quadfrog::realtime::channel::{SHOWN_EVERY, StopLatch};
-use quadfrog::recording::player::{MarkerKind, Played};
+use quadfrog::recording::player::{Marker, MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::{Phase, Snapshot};
@@ -161,7 +161,7 @@ impl ReplayFeed {
             ReplayCommand::Time(time_ns) => self.go_to(time_ns),
             ReplayCommand::Trial(trial) => {
                 if let Some(span) = self.whole.trials.iter().rev().find(|span| span.trial == trial) {
-                    self.go_to(span.begin_ns);
+                    self.go_to(span.row_ns);
                 }
             }
             ReplayCommand::Loop if self.looping.is_some() => self.looping = None,
@@ -206,7 +206,14 @@ impl ReplayFeed {
     }
 
     fn markers(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
-        self.recording.markers().iter().map(|marker| marker.time_ns)
+        self.recording.markers().iter().map(|marker| self.place_of(marker))
+    }
+
+    /// The time at which the replay shows what a marker marks: of a trial also its row.
+    fn place_of(&self, marker: &Marker) -> u64 {
+        let begun = self.whole.trials.binary_search_by_key(&marker.time_ns, |run| run.begin_ns);
+        let run = begun.ok().filter(|_| marker.kind != MarkerKind::Fault).and_then(|at| self.whole.trials.get(at));
+        run.map_or(marker.time_ns, |run| run.row_ns)
     }
 
     /// Begins of faults and of trials that fell.
@@ -215,7 +222,7 @@ impl ReplayFeed {
             MarkerKind::Trial(trial) => self.whole.fell(trial),
             MarkerKind::Fault => true,
         });
-        falls.map(|marker| marker.time_ns)
+        falls.map(|marker| self.place_of(marker))
     }
 
     /// The time before which a place counts as previous: during playback one passed less than 1 s ago is skipped.

@@ -19,7 +19,7 @@ use quadfrog::telemetry::Mode;
 
 use crate::action::Action;
 use crate::keymap::Key;
-use crate::legal::may_request;
+use crate::legal::{may_request, view_keys_keep_countdown};
 use crate::message::{Effect, Msg};
 use crate::model::Model;
 use crate::model::dialog::Dialog;
@@ -122,7 +122,8 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
         Some(Action::Interrupt) => return interrupt(model),
         _ => {}
     }
-    if model.mode() == Mode::Countdown && may_request(model).is_ok() {
+    let looks = action.is_some_and(Action::opens_view) && view_keys_keep_countdown(model);
+    if model.mode() == Mode::Countdown && may_request(model).is_ok() && !looks {
         model.dialog = None;
         drop_answer(model);
         return request(model, OperatorRequest::Cancel);

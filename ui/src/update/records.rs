@@ -5,7 +5,7 @@ use std::time::Duration;
 use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
 use quadfrog::telemetry::{Fault, Mode, TransitionCause};
-use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{Approval, ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
 
 use super::request::{cancelled, reply, say};
 use crate::action::Action;
@@ -163,6 +163,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let waited = model.session.trials.records.get(&number).is_some_and(|before| before.verdict.is_none());
             if waited && trial.verdict.is_some() {
                 model.session.last_judged = Some(number);
+                say_verdict_by_rule(model, &trial);
             }
             model.session.trials.records.insert(number, trial);
             model.history.keep(model.session.trials.best().map(|best| best.trial));
@@ -255,8 +256,26 @@ fn say_suggestion(model: &mut Model, trial: u32) {
     let Some(row) = model.session.trials.records.get(&trial).filter(|row| row.verdict.is_none()) else { return };
     let Some(suggested) = row.suggested else { return };
     let level = if suggested == Verdict::Accept { LogLevel::Info } else { LogLevel::Warning };
-    let text = format!("trial #{trial}, suggested verdict: {} ({})", suggested.name(), row.cause);
+    let text = format!("{}{} ({})", suggestion_of(trial), suggested.name(), row.cause);
     say(model, level, text);
+}
+
+fn suggestion_of(trial: u32) -> String {
+    format!("trial #{trial}, suggested verdict: ")
+}
+
+/// Reports the verdict that the rule of `--approve` has given, in place of the suggestion on the screen. A verdict of the operator is
+/// reported by the answer to it.
+fn say_verdict_by_rule(model: &mut Model, row: &TrialRecord) {
+    let approve = model.session.info.approve;
+    let Some(verdict) = row.verdict.filter(|_| approve != Approval::Each && row.verdict == row.suggested) else {
+        return;
+    };
+    let suggestion = suggestion_of(row.trial);
+    if let Some(level) = model.message.as_ref().filter(|it| it.text.starts_with(&suggestion)).map(|it| it.level) {
+        let (trial, rule, verdict) = (row.trial, approve.name(), verdict.name());
+        say(model, level, format!("trial #{trial}, verdict by --approve {rule}: {verdict} ({})", row.cause));
+    }
 }
 
 fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {

@@ -6,7 +6,7 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 
 use crate::keymap::Key;
-use crate::legal::{may_acknowledge, may_request};
+use crate::legal::{NO_ROBOT_TO_STOP, may_acknowledge, may_request};
 use crate::message::Effect;
 use crate::model::dialog::{Dialog, Purpose};
 use crate::model::{Model, Notice};
@@ -109,7 +109,7 @@ pub(super) fn stop(model: &mut Model) -> Vec<Effect> {
         None => {}
     }
     if model.replay.is_some() {
-        reply(model, LogLevel::Info, "this is a replay: there is no robot to stop");
+        reply(model, LogLevel::Info, NO_ROBOT_TO_STOP);
         return Vec::new();
     }
     let dropped = match &model.dialog {

@@ -357,9 +357,10 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
     let mut phases = vec![None; usize::from(width)];
     let (mut flew, mut airborne_since_ns, mut before) = (false, None, Phase::Stance);
     for sample in history.window(axis.window_ns) {
-        let commanded = if sample.trial.is_some() { sample.phase } else { Phase::Stance };
+        let jumps = sample.trial.is_some() && sample.trial_time_s >= 0.0;
+        let commanded = if jumps { sample.phase } else { Phase::Stance };
         // Each impulse begins a jump.
-        flew &= !(commanded == Phase::Impulse && before != Phase::Impulse);
+        flew &= jumps && !(commanded == Phase::Impulse && before != Phase::Impulse);
         before = commanded;
         let airborne = commanded != Phase::Stance && !sample.contact.iter().any(|&down| down);
         airborne_since_ns = airborne.then(|| airborne_since_ns.unwrap_or(sample.time_ns));
@@ -367,7 +368,8 @@ pub fn phases(axis: &TimeAxis, history: &SignalHistory, width: u16) -> Vec<Optio
         flew |= airborne_since_ns
             .is_some_and(|since_ns| sample.time_ns.saturating_sub(since_ns) as f64 >= SHORTEST_FLIGHT_S * 1e9);
         let phase = match commanded {
-            Phase::Stance => Phase::Stance,
+            // A robot that has landed before the end of its impulse stands after it, for the controller.
+            Phase::Stance if !flew => Phase::Stance,
             _ if airborne => Phase::Flight,
             _ if flew => Phase::Landing,
             _ => Phase::Impulse,

@@ -6,6 +6,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Clear, Paragraph};
 
 use super::draw::span;
+use crate::legal::view_keys_keep_countdown;
 use crate::model::Model;
 use crate::theme::{Role, Theme};
 
@@ -32,12 +33,20 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let mut lines = vec![Line::default()];
     lines.extend((0..ROWS).map(|row| Line::from(span(theme, Role::Warning, digits(theme, seconds, row)))));
-    lines.extend([Line::default(), Line::from(Span::raw(format!("Jump in {seconds} s: any key cancels it.")))]);
+    lines.extend([Line::default(), Line::from(Span::raw(format!("Jump in {seconds} s: {}.", cancels(model))))]);
     let width = lines.iter().map(Line::width).max().unwrap_or(0) as u16 + 4;
     let (width, height) = (width.min(area.width), (lines.len() as u16 + 1).min(area.height));
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height };
     frame.render_widget(Clear, at);
     frame.render_widget(Paragraph::new(lines).centered(), at);
+}
+
+/// The keys that cancel a countdown, in words.
+pub fn cancels(model: &Model) -> &'static str {
+    match view_keys_keep_countdown(model) {
+        true => "any key but those of views cancels it",
+        false => "any key cancels it",
+    }
 }
 
 /// One row of the digits of a number: two columns for each dot, two between digits.

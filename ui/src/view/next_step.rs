@@ -9,7 +9,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::draw::{span, truncate};
-use super::row_keys;
+use super::{countdown, row_keys};
 use crate::action::Action;
 use crate::legal::{legal, may_request, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
@@ -85,7 +85,7 @@ fn live(model: &Model) -> NextStep {
     match model.mode() {
         Mode::Countdown => {
             let left = model.countdown_s.map_or(String::new(), |seconds| format!(" in {seconds} s"));
-            step(format!("Jump{left}: any key cancels it."), model, &[])
+            step(format!("Jump{left}: {}.", countdown::cancels(model)), model, &[])
         }
         Mode::StandUp if session.jumps_without_question() && !finished => {
             step("Standing up; the robot then jumps without a question.", model, &[sit_down])
@@ -185,13 +185,15 @@ fn live(model: &Model) -> NextStep {
         }
         Mode::Ready if session.open_proposal().is_some() => {
             let approve = key(Action::Approve);
+            let times = if session.info.is_hardware() { "" } else { " twice" };
+            let press = format!("Press {approve}{times} to jump");
             let lead = match (session.info.is_hardware(), session.jumps_without_question()) {
-                (true, _) => format!("Press {approve} to jump: y confirms the area, {approve} again jumps."),
+                (true, _) => format!("{press}: y confirms the area, {approve} again jumps."),
                 // An interruption has paused the rule.
-                (false, true) => format!("Press {approve} twice to jump; the next ones follow without a question."),
-                (false, false) => format!("Press {approve} twice to jump."),
+                (false, true) => format!("{press}. The next jumps follow without a question."),
+                (false, false) => format!("{press}."),
             };
-            let short = if session.info.is_hardware() { format!("Press {approve} to jump.") } else { String::new() };
+            let short = format!("{press}.");
             NextStep { short, ..step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down]) }
         }
         _ => step("The sampler is choosing the next trial.", model, &[sit_down]),

@@ -12,7 +12,7 @@ use ratatui::widgets::Paragraph;
 use super::draw::{expectation, falls_near, heading, number, scale, span, with_deviation};
 use super::points;
 use crate::action::Action;
-use crate::legal::legal;
+use crate::legal::{legal, may_request};
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -52,7 +52,9 @@ fn content(model: &Model, width: usize) -> PanelText {
     let (session, theme) = (&model.session, &model.theme);
     let stage = session.stage.map(|info| info.stage);
     if let Some(trial) = session.under_review() {
-        return PanelText::new(format!("Trial #{}: judge it", trial.trial), review(session, theme, trial));
+        // A replay and a console that watches give no verdict.
+        let asks = if may_request(model).is_ok() { "judge it" } else { "no verdict yet" };
+        return PanelText::new(format!("Trial #{}: {asks}", trial.trial), review(session, theme, trial));
     }
     // A recording that begins within a trial.
     if session.proposal.is_none()

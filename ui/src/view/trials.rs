@@ -244,7 +244,7 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     let arm = if model.session.jumps_without_question() { "arm: it stands up and jumps" } else { "arm: it stands up" };
     let lines = vec![
         step("before", &[(Action::Arm, arm), (Action::Override, "override"), (Action::Skip, "skip")]),
-        step("jump  ", &[(Action::Approve, "approve; again after 0.8 s: the robot jumps")]),
+        step("jump  ", &[(Action::Approve, "approve the jump; again after 0.8 s: countdown and jump")]),
         step("after ", &[&judge[..], &[(Action::Undo, "undo")]].concat()),
         step(
             "always",
