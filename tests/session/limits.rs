@@ -128,6 +128,23 @@ fn a_tripped_limit_without_a_verdict_is_a_fall_at_the_end_of_the_session() {
     assert_ne!(parameters(&again), row.parameters.iter().map(|(_, value)| *value).collect::<Vec<_>>());
 }
 
+/// Regression: the row had the verdict although the journal could not be written.
+#[test]
+fn a_verdict_that_the_end_of_the_session_cannot_write_is_in_no_row() {
+    for end in [TOO_FAST, TrialEnd::Stopped] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut session = open(folder.path());
+        let spec = run(&mut session, end);
+        let before = session.row(spec.trial).cloned();
+        let journal = folder.path().join("study.log");
+        std::fs::rename(&journal, folder.path().join("elsewhere")).unwrap();
+        std::fs::create_dir(&journal).unwrap();
+        session.close_unreviewed().unwrap_err();
+        assert_eq!(session.row(spec.trial).cloned(), before);
+        assert_eq!(session.under_review().cloned(), before, "it waits for its verdict");
+    }
+}
+
 /// A jump beyond the motors, over the link of an emulated Go1.
 #[test]
 fn a_limit_that_an_emulated_robot_trips_is_a_fall() {

@@ -184,10 +184,20 @@ impl Experiment {
         if row.suggested != Some(verdict) || verdict == Verdict::Void && row.hand_value.is_some() {
             return Ok(());
         }
+        let before = row.clone();
         row.verdict = Some(verdict);
-        let cause = row.cause.clone();
+        if let Err(error) = self.write_closed(trial, limit, &before.cause) {
+            // On the disk it has no verdict.
+            self.rows.insert(trial, before);
+            return Err(error);
+        }
         self.publish_row(trial);
         self.state = ExperimentState::Finished;
+        Ok(())
+    }
+
+    /// Writes the verdict of a trial that the end of the session judges: a fall by a limit, or void and queued again.
+    fn write_closed(&mut self, trial: u32, limit: bool, cause: &str) -> Result<(), StudyError> {
         if limit {
             return match self.write_judgement(trial, false) {
                 Ok(()) => self.study.tell(trial, Outcome::Complete(0.0)).map(drop),
@@ -196,7 +206,7 @@ impl Experiment {
                 Err(error) => Err(error),
             };
         }
-        let log = self.queue.close(&mut self.study, trial, &cause)?;
+        let log = self.queue.close(&mut self.study, trial, cause)?;
         self.log_all(log);
         Ok(())
     }
