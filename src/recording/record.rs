@@ -111,6 +111,12 @@ impl SessionInfo {
         if self.commit.is_empty() { self.version.clone() } else { format!("{} ({})", self.version, self.commit) }
     }
 
+    /// Returns the operator with the rule of approval, "operator Anna, --approve each"; none in older recordings.
+    pub fn operator_in_words(&self) -> Option<String> {
+        let words = || format!("operator {}, --approve {}", self.operator, self.approve.name());
+        (!self.operator.is_empty()).then(words)
+    }
+
     /// Returns whether the session drives a robot.
     pub fn is_hardware(&self) -> bool {
         self.backend == Some(Backend::Hardware)

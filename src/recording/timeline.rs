@@ -8,7 +8,7 @@ use super::player::{LostPart, Marker, MarkerKind, Played, Player};
 use super::record::{Record, SessionInfo, StageRecord, Stamped};
 use super::session_files::recordings_in;
 use crate::telemetry::Mode;
-use crate::trial::{ExperimentStage, TrialRecord};
+use crate::trial::{ExperimentStage, Overrides, TrialRecord};
 
 /// Longest pause between two files that is played in its length, ns; of a longer one 1 s is left.
 const LONGEST_PAUSE_NS: u64 = 10_000_000_000;
@@ -259,6 +259,17 @@ impl Timeline {
     /// Returns the newest row of each trial.
     pub fn rows(&self) -> BTreeMap<u32, TrialRecord> {
         rows_of(self.parts.iter().flat_map(|part| part.player.events()))
+    }
+
+    /// Returns the values that the operator has set in place of proposed ones.
+    pub fn overrides(&self) -> Overrides {
+        let mut overrides = Overrides::default();
+        for event in self.parts.iter().flat_map(|part| part.player.events()) {
+            if let Record::Proposal(proposal) = &event.record {
+                overrides.take(proposal);
+            }
+        }
+        overrides
     }
 
     /// Returns all records but the counters before a time, in the order of time.

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use super::jump::{JumpCurves, JumpQuantities};
 use crate::recording::player::{Played, Player};
-use crate::recording::record::Stamped;
+use crate::recording::record::{Record, Stamped};
 use crate::recording::timeline::ended_trial;
 use crate::robot::description::RobotDescription;
 use crate::telemetry::Tick;
+use crate::trial::Overrides;
 
 /// Time before the impulse from which curves are shown, s.
 const BEFORE_S: f64 = 0.1;
@@ -41,6 +42,10 @@ pub struct Recordings {
     pub in_part: BTreeSet<u32>,
     /// Recordings that were read.
     pub files: Vec<PathBuf>,
+    /// Values that operators have set in place of proposed ones.
+    pub overrides: Overrides,
+    /// Operators of the sessions with their rules of approval, in words.
+    pub operators: BTreeSet<String>,
     /// Versions of quadfrog that wrote them, each with its commit.
     pub programs: BTreeSet<String>,
     /// Damaged and unreadable recordings, as sentences.
@@ -63,6 +68,7 @@ impl Recordings {
 
     fn play(&mut self, mut player: Player, robot: &RobotDescription) {
         self.programs.insert(player.session().program_version());
+        self.operators.extend(player.session().operator_in_words());
         self.with_ticks.extend(player.trials_with_ticks());
         let mut ticks: Vec<Tick> = Vec::new();
         let mut last_ended = None;
@@ -70,6 +76,9 @@ impl Recordings {
             let tick = match played {
                 Played::Tick(tick) => tick,
                 Played::Record(Stamped { record, .. }) => {
+                    if let Record::Proposal(proposal) = &record {
+                        self.overrides.take(proposal);
+                    }
                     last_ended = ended_trial(&record).or(last_ended);
                     continue;
                 }

@@ -15,7 +15,7 @@ pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -
         [only] => format!("Study {}", title(only)),
         several => format!("{} studies", several.len()),
     };
-    let places: Vec<&str> = studies.iter().map(|study| study.place.as_str()).collect();
+    let places: Vec<String> = studies.iter().map(place).collect();
     let mut page = Page::new(format!("quadfrog report: {name}"), format!("{}; quadfrog {version}", places.join(", ")));
     page.sections.push(objective(&groups));
     page.sections.push(results(studies, &groups));
@@ -38,7 +38,13 @@ pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -
 pub fn summary(study: &ReportedStudy) -> Page {
     let studies = std::slice::from_ref(study);
     let sections = vec![objective(&by_task(studies)), results(studies, &by_task(studies)), verdicts(studies)];
-    Page { sections, ..Page::new(format!("Study {}", title(study)), study.place.clone()) }
+    Page { sections, ..Page::new(format!("Study {}", title(study)), place(study)) }
+}
+
+/// The place of a study, with the operators of its recorded sessions.
+fn place(study: &ReportedStudy) -> String {
+    let operators: Vec<&str> = study.recordings.operators.iter().map(String::as_str).collect();
+    if operators.is_empty() { study.place.clone() } else { format!("{} ({})", study.place, operators.join("; ")) }
 }
 
 /// Equation of the objective of a task.
@@ -168,6 +174,7 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
 fn verdicts(studies: &[ReportedStudy]) -> Section {
     let mut section = Section::new("Trials, verdicts and notes");
     section.blocks.extend(tables::remarks(studies).map(Block::Table));
+    section.blocks.extend(tables::overrides(studies).map(Block::Table));
     section.blocks.extend(studies.iter().map(|study| Block::Table(tables::trials(study))));
     section
 }

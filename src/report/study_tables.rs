@@ -4,7 +4,7 @@ use super::page::{Cell, Column, Table};
 use super::study::{ReportedStudy, mean_and_deviation};
 use super::study_figures::DrawnTrial;
 use crate::robot::JOINT_NAMES;
-use crate::trial::{Task, TrialRecord, Verdict};
+use crate::trial::{Task, TrialRecord, Verdict, parameter_unit};
 
 /// Numbers of trials at which the best so far is listed.
 const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
@@ -270,6 +270,23 @@ pub fn remarks(studies: &[ReportedStudy]) -> Option<Table> {
                     Cell::text(if explained { row.cause.clone() } else { String::new() }),
                     Cell::text(row.note.clone()),
                 ]);
+            }
+        }
+    }
+    (!table.rows.is_empty()).then_some(table)
+}
+
+/// Values that operators have set in place of proposed ones; none if there are none.
+pub fn overrides(studies: &[ReportedStudy]) -> Option<Table> {
+    let columns = [Column::text("study"), Column::number("trial", ""), Column::text("value")].into_iter();
+    let columns = columns.chain(["proposed", "set"].map(|name| Column::number(name, "")));
+    let mut table = Table::new("Values that an operator has set in place of the proposed ones.", columns);
+    for study in studies {
+        for row in &study.rows {
+            for p in study.recordings.overrides.of(row) {
+                let name = format!("{} ({})", p.name, parameter_unit(&p.name));
+                let cells = [Cell::text(title(study)), Cell::count(row.trial as usize), Cell::text(name)];
+                table.rows.push(cells.into_iter().chain([p.proposed, p.value].map(|v| Cell::number(v, 3))).collect());
             }
         }
     }

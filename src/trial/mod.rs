@@ -1,11 +1,13 @@
 //! Vocabulary of a trial: task, parameters with units, proposal, status, verdict, measured values.
 
 mod measured;
+mod overrides;
 mod parameters;
 mod record;
 mod search;
 
 pub use self::measured::{BounceRule, CHANGED, Displacement, JumpRow, MeasuredJump, ObjectiveRule, RepeatRecord};
+pub use self::overrides::Overrides;
 pub use self::parameters::{
     GAIN_UNITS, Gains, JumpParameters, ParameterInfo, ParameterValues, is_gain, other_gains, parameter_unit,
 };

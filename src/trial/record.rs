@@ -109,24 +109,64 @@ impl TrialRecord {
     pub fn is_overruled(&self) -> bool {
         let otherwise =
             self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
-        otherwise || self.changed_because().is_some()
+        otherwise || OperatorsWords::of(&self.cause).is_some_and(|words| words.act.starts_with(CHANGED))
     }
 
-    /// Returns the operator's reason of the last change of the verdict, and the rest of the cause; none where it was not changed.
-    pub fn changed_because(&self) -> Option<(&str, String)> {
-        let change = format!("{CHANGED}, was ");
-        if let Some(rest) = self.cause.strip_prefix(&change) {
-            // As earlier versions have written it.
-            let (before, rest) = rest.split_once(": ")?;
-            let (reason, rest) = rest.split_once("; ").unwrap_or((rest, ""));
-            return Some((reason, format!("{change}{before}; {rest}")));
+    /// Returns the operator's reason of a verdict, empty without one, and the rest of the cause as one sentence; none where the rules
+    /// have judged.
+    pub fn operators_reason(&self) -> Option<(&str, String)> {
+        let words = OperatorsWords::of(&self.cause)?;
+        // Earlier versions have kept the words of all changes.
+        Some((words.reason, format!("{} ({})", words.act, self.cause_by_rule())))
+    }
+
+    /// Returns the cause without the words of the operator: that of the rules.
+    pub fn cause_by_rule(&self) -> &str {
+        let mut cause = self.cause.as_str();
+        while let Some(words) = OperatorsWords::of(cause) {
+            cause = words.rest;
         }
-        let (reason, _) = self.cause.split_once(&format!("; {change}"))?;
-        Some((reason, self.cause[reason.len() + 2..].to_owned()))
+        cause
     }
 
     /// Returns the number of repeats that count.
     pub fn counted_repeats(&self) -> u32 {
         self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
+    }
+}
+
+/// The parts of a cause that begins with words of the operator.
+struct OperatorsWords<'a> {
+    /// The operator's reason; empty without one.
+    reason: &'a str,
+    /// `changed by the operator, was accept`, `by the operator, suggested was fall`, `re-run by the operator`.
+    act: String,
+    /// The cause before.
+    rest: &'a str,
+}
+
+impl OperatorsWords<'_> {
+    fn of(cause: &str) -> Option<OperatorsWords<'_>> {
+        let change = format!("{CHANGED}, was ");
+        if let Some(rest) = cause.strip_prefix(&change) {
+            // As earlier versions have written it.
+            let (before, rest) = rest.split_once(": ")?;
+            let (reason, rest) = rest.split_once("; ").unwrap_or((rest, ""));
+            return Some(OperatorsWords { reason, act: change + before, rest });
+        }
+        if let Some((reason, rest)) = cause.split_once(&format!("; {change}")) {
+            let (before, rest) = rest.split_once("; ").unwrap_or((rest, ""));
+            return Some(OperatorsWords { reason, act: change + before, rest });
+        }
+        let by = ["by the operator", "re-run by the operator"].into_iter().find(|by| cause.starts_with(by))?;
+        let words = &cause[by.len()..];
+        let (words, act, rest) = match words.split_once("; looked like ") {
+            Some((words, rest)) => {
+                let (suggested, rest) = rest.split_once(": ")?;
+                (words, format!("{by}, suggested was {suggested}"), rest)
+            }
+            None => words.split_once("; ").map(|(words, rest)| (words, by.to_owned(), rest))?,
+        };
+        Some(OperatorsWords { reason: words.strip_prefix(": ").unwrap_or(words), act, rest })
     }
 }

@@ -6,7 +6,7 @@ use quadfrog::recording::timeline::Timeline;
 use quadfrog::recording::writer::Writer;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
-use quadfrog::trial::{Approval, Backend, ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{Approval, Backend, ExperimentStage, ParameterValues, ProposedParameter, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, Msg, ReplayCommand, ReplayStatus, ReplayStep};
 
@@ -21,6 +21,7 @@ fn the_keys_of_views_cancel_no_countdown_of_automatic_jumps() {
     let of = |approve, backend| {
         let mut console = Console::ready();
         console.record(Record::Session(SessionInfo { approve, backend: Some(backend), ..session() }));
+        console.judged(2);
         let before = console.model.snapshot;
         let tick = Tick { number: before.tick.number + 1, mode: Mode::Countdown, trial_time_s: -2.5, ..before.tick };
         console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..before })));
@@ -33,6 +34,8 @@ fn the_keys_of_views_cancel_no_countdown_of_automatic_jumps() {
             for (columns, rows) in [(80, 24), (120, 40)] {
                 let screen = console.screen(columns, rows);
                 let lead = "Jump in 3 s: any key but those of views cancels it.";
+                // Regression: in Trials the line named keys of the row, which cancel.
+                assert_eq!(last(&screen).trim(), lead, "{key}");
                 assert_eq!(screen.matches(lead).count(), 2, "{key}: beside the digits and as the next step:\n{screen}");
             }
         }
@@ -90,7 +93,10 @@ fn a_replay_asks_for_no_verdict_and_offers_no_stop() {
         assert!(!screen.to_lowercase().contains("judge it"), "{screen}");
     }
     console.press(&[":", "s", "t", "o", "p"]);
-    assert_shows(&console.screen(120, 40), &["(this is a replay: there is no robot to stop)"]);
+    assert_shows(
+        &console.screen(120, 40),
+        &["(this is a replay: there is no robot to stop)", "twice within 2 s: quit"],
+    );
 }
 
 /// Regression: without room for the keys the step of a rule that goes on was cut.
@@ -178,4 +184,70 @@ fn a_replay_that_goes_to_a_trial_shows_its_row() {
     }
     // One step on, the previous one is the begin of the trial itself.
     assert_eq!(go(&[Forward(ReplayStep::Second), PreviousMarker]), (Some(3), Some(false)));
+}
+
+/// Regression: the proposed value of an override stood in no table and in no details.
+#[test]
+fn the_details_of_a_trial_hold_the_proposed_value_of_an_override() {
+    let mut console = Console::ready();
+    let changed = |list: &mut [ProposedParameter], name: &str, proposed| {
+        list.iter_mut().find(|p| p.name == name).unwrap().proposed = proposed;
+    };
+    let mut first = proposal(0, 1);
+    changed(&mut first.parameters, "Fx", 61.234_5);
+    changed(&mut first.gains, "kp", 350.0);
+    // An override that was taken back before the approval.
+    let mut second = proposal(1, 3);
+    changed(&mut second.parameters, "f0", 1.1);
+    for proposal in [first, second, proposal(1, 4)] {
+        console.record(Record::Proposal(proposal));
+    }
+    let gains = ParameterValues::from(vec![("kp".to_owned(), 400.0)]);
+    for number in [0, 1] {
+        let row = TrialRecord { gains: gains.clone(), ..trial(number, Some(Verdict::Accept), Some(Verdict::Accept)) };
+        console.record(Record::Trial(row));
+    }
+    console.press(&["2", "Home", "Enter"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["75.00000 N, overridden; proposed 61.23", "kp 400 N/m, overridden; proposed 350.0"]);
+    console.press(&["Down"]);
+    assert!(!console.screen(120, 40).contains("overridden"), "{}", console.screen(120, 40));
+    console.press(&["Esc", "R", "PgDn"]);
+    assert_shows(&console.screen(120, 40), &["Values that an operator has set in place of the proposed ones."]);
+}
+
+/// Regression: a verdict that was changed three times had four reasons and causes in a row.
+#[test]
+fn the_cause_of_the_operator_is_a_reason_and_a_sentence() {
+    for (cause, reason, sentence) in [
+        ("landed and settled", None, "landed and settled"),
+        ("by the operator; looked like fall: roll 1.2 rad", None, "by the operator, suggested was fall (roll 1.2 rad)"),
+        (
+            "re-run by the operator: a cable pulled; looked like fall: roll 1.2 rad",
+            Some("a cable pulled"),
+            "re-run by the operator, suggested was fall (roll 1.2 rad)",
+        ),
+        (
+            "by the operator: a cable pulled; STOP was pressed",
+            Some("a cable pulled"),
+            "by the operator (STOP was pressed)",
+        ),
+        (
+            "the video shows it; changed by the operator, was void; a cable pulled; changed by the operator, was fall; by the \
+             operator: it slid; looked like accept: landed and settled",
+            Some("the video shows it"),
+            "changed by the operator, was void (landed and settled)",
+        ),
+    ] {
+        let mut console = Console::ready();
+        let row = TrialRecord { cause: cause.into(), ..trial(0, Some(Verdict::Void), None) };
+        console.record(Record::Trial(row));
+        console.press(&["2", "Enter"]);
+        let screen = console.screen(120, 40);
+        let at = |name: &str| {
+            let line = screen.lines().find_map(|line| line.split_once(&format!("│ {name} ")));
+            line.map(|(_, value)| value.trim_matches([' ', '│']).to_owned())
+        };
+        assert_eq!((at("reason").as_deref(), at("cause").as_deref()), (reason, Some(sentence)), "{screen}");
+    }
 }

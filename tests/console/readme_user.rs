@@ -175,7 +175,7 @@ fn the_reason_of_a_changed_verdict_comes_first_and_whole() {
             let screen = console.screen(columns, rows);
             assert!(line_with(&screen, "reason").contains("the video shows that"), "{screen}");
             let text = screen.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
-            let cause = "cause changed by the operator, was accept; landed and settled";
+            let cause = "cause changed by the operator, was accept (landed and settled)";
             assert_shows(&text, &[&format!("reason {reason} {cause}")]);
             console.press(&["Esc"]);
         }

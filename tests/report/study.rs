@@ -2,13 +2,17 @@
 
 use nalgebra::Vector3;
 use quadfrog::optimize::ask::Direction;
+use quadfrog::recording::record::{Record, SessionInfo, Stamped};
+use quadfrog::recording::writer::Writer;
 use quadfrog::report::jump::{JumpCurves, JumpQuantities, force_angle_rad};
 use quadfrog::report::recorded::{RecordedTrial, Recordings};
 use quadfrog::report::study::{ReportedStudy, TrialChoice, mean_and_deviation, mean_best_so_far};
 use quadfrog::report::{study_page, text};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Tick;
-use quadfrog::trial::{JumpParameters, ParameterInfo, ProposalSource, Task, TrialRecord, Verdict};
+use quadfrog::trial::{
+    Approval, JumpParameters, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task, TrialRecord, Verdict,
+};
 
 /// Ticks from -0.2 s: on the ground until 0.3 s but for a lift of 5 ms at 0.1 s, in the air until 0.8 s, then landed.
 fn ticks() -> Vec<Tick> {
@@ -186,4 +190,41 @@ fn a_page_of_a_study_names_missing_ticks_and_draws_the_others() {
     let shown = text::render(&page, 80).replace('\n', " ");
     assert!(shown.contains("Ticks of 2 of 6 trials are recorded, of trial 0 in part"), "{shown}");
     assert_eq!([0, 1, 2].map(|trial| study.ticks_of(trial)), ["in part", "yes", "no"]);
+}
+
+/// Regression: neither the operator nor the rule of approval nor the proposed value of an override stood in a report.
+#[test]
+fn a_report_names_the_operators_and_the_values_that_they_have_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let files =
+        [("Anna", Approval::Each), ("Berta", Approval::FallsOnly), ("", Approval::Each)].map(|(operator, approve)| {
+            let path = folder.path().join(format!("session{operator}.mcap"));
+            let info = SessionInfo { operator: operator.into(), approve, ..SessionInfo::default() };
+            let mut writer = Writer::create(&path, &info, 0, &[]).unwrap();
+            let fx = ProposedParameter { name: "Fx".into(), value: 100.0, proposed: 41.25 };
+            // Another trial has run with another value than that of its proposal.
+            let other = ProposedParameter { name: "Fz".into(), value: 190.0, proposed: 180.0 };
+            for (trial, p) in [(1, fx), (3, other)] {
+                let record = Record::Proposal(Proposal { trial, parameters: vec![p], ..Proposal::default() });
+                writer.record(&Stamped { time_ns: 1_000_000, record }).unwrap();
+            }
+            writer.finish().unwrap();
+            path
+        });
+    let mut study = study(0, rows());
+    study.recordings = Recordings::read(&files, &robot);
+    let page = study_page::page(std::slice::from_ref(&study), &[], "0.1.0 (test)");
+    let shown = text::render(&page, 200);
+    assert!(
+        shown.contains("study (operator Anna, --approve each; operator Berta, --approve falls-only); quadfrog 0.1.0"),
+        "{shown}"
+    );
+    let (_, table) = shown.split_once("Values that an operator has set in place of the proposed ones.").unwrap();
+    let rows: Vec<&str> = table.lines().skip(3).take_while(|line| !line.is_empty()).collect();
+    assert_eq!(rows.len(), 1, "{shown}");
+    assert!(rows[0].contains("Fx (N)") && rows[0].contains("41.250") && rows[0].ends_with("100.000"), "{}", rows[0]);
+    study.recordings = Recordings::default();
+    let shown = text::render(&study_page::page(&[study], &[], "0.1.0 (test)"), 200);
+    assert!(shown.contains("study; quadfrog") && !shown.contains("Values that an operator"), "{shown}");
 }

@@ -280,6 +280,8 @@ fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
     experiment.change_verdict(first, Verdict::Accept, "the video shows a landing").unwrap();
     assert_eq!((experiment.counted(), experiment.row(first).unwrap().value), (2, value));
     experiment.change_verdict(first, Verdict::Fall, "it lay").unwrap();
+    // Regression: it held the reasons of all changes. The journal keeps them.
+    assert_eq!(experiment.row(first).unwrap().cause, "it lay; changed by the operator, was accept; landed and settled");
     let shown = |row: &TrialRecord| (row.verdict, row.value, row.cause.clone());
     let rows: Vec<_> = experiment.rows().map(shown).collect();
     experiment.close().unwrap();

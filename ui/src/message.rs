@@ -11,7 +11,7 @@ use quadfrog::recording::timeline::TrialRun;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{Snapshot, Tick};
-use quadfrog::trial::{TrialRecord, Verdict};
+use quadfrog::trial::{Overrides, TrialRecord, Verdict};
 
 use crate::keymap::Key;
 use crate::theme::Background;
@@ -249,6 +249,8 @@ pub struct ReplayTimeline {
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// Values that the operator has set in place of proposed ones.
+    pub overrides: Overrides,
     /// The best trial at the end of the recording, by the rule of the table; none without an accepted one.
     pub best: Option<u32>,
     /// Begin of each file, ns, with its UTC time, ns since 1970: a session that continues a study begins another.

@@ -45,7 +45,11 @@ pub fn report(session: &SessionModel, width: usize) -> Vec<String> {
         fixed: Vec::new(),
         model_best: session.trials.model_best,
         limits: None,
-        recordings: Recordings::default(),
+        recordings: Recordings {
+            overrides: session.overrides.clone(),
+            operators: info.operator_in_words().into_iter().collect(),
+            ..Recordings::default()
+        },
         changed: Vec::new(),
         unit: info.unit.clone(),
         configuration: Vec::new(),

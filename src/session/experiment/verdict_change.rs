@@ -37,8 +37,8 @@ impl Experiment {
         if verdict != Verdict::Void && value.is_none() {
             return not_now(format!("nothing was measured in trial {trial}: it cannot be accepted"));
         }
-        // The operator's reason first: a long line is cut.
-        let cause = format!("{reason}; {CHANGED}, was {}; {}", before.name(), row.cause);
+        // The operator's reason first: a long line is cut. Earlier reasons are in the journal.
+        let cause = format!("{reason}; {CHANGED}, was {}; {}", before.name(), row.cause_by_rule());
         let change = VerdictChange {
             at: Timestamp::now().to_string(),
             verdict: verdict.name().to_owned(),

@@ -326,6 +326,7 @@ impl ReplayFeed {
             faults_ns: faults.map(|marker| marker.time_ns).collect(),
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
+            overrides: self.recording.overrides(),
             best: best_of(&self.recording),
             begins_utc_ns: self.recording.begins_utc_ns(),
             second: self.pair.second(),

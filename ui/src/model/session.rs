@@ -3,8 +3,8 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    Approval, ExperimentStage, ObjectiveRule, ParameterInfo, PointRecord, Proposal, ProposalInsight, ProposedParameter,
-    QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
+    Approval, ExperimentStage, ObjectiveRule, Overrides, ParameterInfo, PointRecord, Proposal, ProposalInsight,
+    ProposedParameter, QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -19,6 +19,8 @@ pub struct SessionModel {
     pub stage: Option<StageRecord>,
     /// The newest proposal; its trial may run already.
     pub proposal: Option<Proposal>,
+    /// Values that the operator has set in place of proposed ones in this session.
+    pub overrides: Overrides,
     /// The newest arming checks; empty before the robot was disarmed for the first time.
     pub arming_checks: Vec<ArmingCheckRecord>,
     /// Time of the newest arming checks, ns since the engine started.

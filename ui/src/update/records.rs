@@ -152,6 +152,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let values: Vec<String> = proposal.parameters.iter().map(value).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
             log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
+            model.session.overrides.take(&proposal);
             model.session.proposal = Some(proposal);
         }
         Record::Trial(trial) => {

@@ -1,14 +1,23 @@
 //! All details of one trial, for their dialog.
 
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
-use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, TrialRecord, six_digits};
+use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, Overrides, TrialRecord, four_digits, six_digits};
 
 use super::draw::{clock, falls_near};
 use super::points;
 use crate::model::session::SessionModel;
 use crate::theme::Theme;
 
-pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<(String, String)> {
+pub fn details(
+    session: &SessionModel,
+    theme: &Theme,
+    trial: &TrialRecord,
+    overrides: &Overrides,
+) -> Vec<(String, String)> {
+    let proposed = |name: &str| {
+        let overridden = overrides.of(trial).find(|p| p.name == name);
+        overridden.map_or(String::new(), |p| format!(", overridden; proposed {}", four_digits(p.proposed)))
+    };
     let unit = &session.info.unit;
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
@@ -17,9 +26,11 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
     if let Some(suggested) = trial.suggested {
         row("suggested", suggested.name().to_owned());
     }
-    match trial.changed_because() {
+    match trial.operators_reason() {
         Some((reason, cause)) => {
-            row("reason", reason.to_owned());
+            if !reason.is_empty() {
+                row("reason", reason.to_owned());
+            }
             row("cause", cause);
         }
         None if !trial.cause.is_empty() => row("cause", trial.cause.clone()),
@@ -59,11 +70,12 @@ pub fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Ve
         let bounds = range.map_or(String::new(), |range| {
             format!("  (searched from {} to {} {unit})", six_digits(range.low), six_digits(range.high))
         });
-        row(name, format!("{value:.5} {unit}{bounds}"));
+        row(name, format!("{value:.5} {unit}{}{bounds}", proposed(name)));
     }
     if !trial.gains.is_empty() {
         let unit = |name: &str| session.gain(name).map_or(String::new(), |gain| format!(" {}", gain.unit));
-        let gain = |(name, value): &(String, f64)| format!("{name} {}{}", six_digits(*value), unit(name));
+        let gain =
+            |(name, value): &(String, f64)| format!("{name} {}{}{}", six_digits(*value), unit(name), proposed(name));
         row("gains", trial.gains.iter().map(gain).collect::<Vec<_>>().join(", "));
     }
     if let Some(m) = &trial.measured {

@@ -113,7 +113,8 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
     let inside = usize::from(width.saturating_sub(4));
     let mut lines: Vec<Line> = Vec::new();
     let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
-    for (name, value) in details(&model.session, &model.theme, record).into_iter().chain(rejudged(again)) {
+    let overrides = model.timeline.as_ref().map_or(&model.session.overrides, |timeline| &timeline.overrides);
+    for (name, value) in details(&model.session, &model.theme, record, overrides).into_iter().chain(rejudged(again)) {
         // Long values continue on the next line.
         let line = Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)]);
         lines.extend(wrap(&line, inside, 15));
@@ -366,7 +367,7 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
     for (index, (info, legal)) in actions.into_iter().enumerate() {
         let (key, name) = (model.keymap.key(info.action), info.name);
         let text = match &legal {
-            Ok(()) => info.help.to_owned(),
+            Ok(()) => help::text_of(info, model).to_owned(),
             Err(reason) => format!("({reason})"),
         };
         let role = if legal.is_ok() { Role::Text } else { Role::Quiet };

@@ -4,7 +4,7 @@ use ratatui::text::Line;
 use strum::VariantArray;
 
 use super::draw::span;
-use crate::action::{ACTIONS, Action, ActionGroup};
+use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
 use crate::legal::{has_meaning, legal};
 use crate::model::Model;
 use crate::theme::Role;
@@ -17,7 +17,6 @@ pub const INDENT: usize = 13;
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
-    let quits_alone = |action| action == Action::Interrupt && !model.can_stop();
     let mut groups = ActionGroup::VARIANTS.to_vec();
     let first = match (&model.replay, model.session.under_review()) {
         (Some(_), _) => Some(ActionGroup::Replay),
@@ -40,9 +39,17 @@ pub fn lines(model: &Model) -> Vec<Line<'static>> {
             let (key, text) = if legal { (Role::Key, Role::Text) } else { (Role::Quiet, Role::Quiet) };
             lines.push(Line::from(vec![
                 span(theme, key, format!("  {:<10} ", model.keymap.all_keys(info.action))),
-                span(theme, text, if quits_alone(info.action) { "twice within 2 s: quit" } else { info.help }),
+                span(theme, text, text_of(info, model)),
             ]));
         }
     }
     lines
+}
+
+/// The text of an action; of the key that stops and quits, where nothing can be stopped, without STOP.
+pub fn text_of(info: &ActionInfo, model: &Model) -> &'static str {
+    match info.action {
+        Action::Interrupt if !model.can_stop() => "twice within 2 s: quit",
+        _ => info.help,
+    }
 }

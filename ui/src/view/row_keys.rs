@@ -1,11 +1,17 @@
 //! The keys of the selected row of Trials, and those of two trials that are laid over each other, for the last line.
 
+use quadfrog::telemetry::Mode;
+
 use crate::action::Action;
 use crate::legal::legal;
 use crate::model::{Model, View};
 
 /// Keys and their effects, as far as they are accepted now; none in other views.
 pub fn keys(model: &Model) -> Vec<(String, String)> {
+    // Any of them would cancel it.
+    if model.mode() == Mode::Countdown && model.replay.is_none() {
+        return Vec::new();
+    }
     match model.view {
         View::Trials => of_row(model),
         View::Live if model.live.comparison.is_some() => of_comparison(model),
