@@ -9,7 +9,7 @@ use portable_pty::CommandBuilder;
 use quadfrog::recording::player::Played;
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::telemetry::Tick;
-use quadfrog::trial::TrialRecord;
+use quadfrog::trial::{TrialRecord, Verdict};
 
 /// Two studies of six trials without a screen, every tick recorded: seeds 0 and 1.
 fn studies() -> &'static [PathBuf; 2] {
@@ -228,4 +228,42 @@ fn damage_of_the_second_recording_is_in_the_exit_status() {
     session.send("q");
     assert_eq!(session.wait().exit_code(), 1);
     assert_shows(&session.screen().replace('\n', ""), &["cut.mcap", "quadfrog recover"]);
+}
+
+/// Regression: `c` laid what was played of a trial; the countdown alone drew no line, and a trial that was not played was refused.
+#[test]
+fn whole_jumps_are_compared_wherever_the_playhead_is() {
+    let mut session = paused((120, 40), &[]);
+    // In the countdown of trial 2 nothing but its pose was played.
+    let begin_ms = timeline(0).trials().iter().find(|run| run.trial == 2).unwrap().begin_ns / 1_000_000 + 20;
+    session.send(&format!("G{}.{:03}\r", begin_ms / 1000, begin_ms % 1000));
+    session.wait_for(&[&format!("{:02}:{:02}.{:03}", begin_ms / 60_000, begin_ms / 1000 % 60, begin_ms % 1000)]);
+    session.send("2c");
+    session.wait_for(&["trial 2 is laid under the charts of a jump; c on another row of Trials compares the two"]);
+    session.send("\x1b[Fc");
+    session.wait_for(&["A is trial 2, B is trial 5"]);
+    session.send("1");
+    session.wait_for(&["A #2 line, B #5 dotted, at +0.00 s"]);
+    let shown = format!("roll A {} B {}", roll(0, 2, 0.0), roll(0, 5, 0.0));
+    assert_shows(&session.screen(), &[&shown, "Two trials"]);
+    let at_s = go(&mut session, 2, 0.25);
+    session.wait_for(&["at +0.25 s"]);
+    assert_shows(&session.screen(), &[&format!("roll A {} B {}", roll(0, 2, at_s), roll(0, 5, at_s))]);
+    // The same again ends it.
+    session.send("c");
+    session.wait_until("it ends", || !session.screen().contains("dotted"));
+    session.send("q");
+    assert!(session.wait().success());
+}
+
+/// Regression: before anything was played there was `no jump` in a recording of six.
+#[test]
+fn the_best_trial_of_a_recording_is_laid_under_the_charts_from_the_start() {
+    let mut session = paused((120, 40), &[]);
+    let best = timeline(0).rows().into_values().filter(|row| row.verdict == Some(Verdict::Accept));
+    let best = best.max_by(|a, b| a.value.partial_cmp(&b.value).unwrap()).unwrap().trial;
+    session.send("c");
+    session.wait_for(&[&format!("trial {best} is laid under the charts of a jump")]);
+    session.send("q");
+    assert!(session.wait().success());
 }

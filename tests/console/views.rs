@@ -715,3 +715,16 @@ fn the_details_and_the_exported_table_hold_touchdown_bounces_and_every_jump() {
     assert!(header.ends_with("flights,touchdown_dx_m,touchdown_dy_m,touchdown_dyaw_rad,jumps"), "{header}");
     assert!(line.contains(",3,0.75,0.01,0.02,") && line.contains("\"\"time_s\"\":1.0"), "{line}");
 }
+
+/// Regression: a trial that was cancelled in its countdown was compared as a jump, without a line in any chart.
+#[test]
+fn a_trial_that_ended_before_its_impulse_is_not_laid_under_the_charts() {
+    let mut console = jumped(&[0]);
+    console.record(Record::Trial(trial(1, Some(Verdict::Void), None)));
+    (5_000..5_400).step_by(5).for_each(|ms| {
+        console.tick(tick(ms, 0.0, Some((1, ms as f64 / 1e3 - 8.0, Phase::Stance))));
+    });
+    console.press(&["2", "Home", "c", "End", "c"]);
+    assert_eq!(console.said(), "trial 1 ended before its impulse: it has no jump for the charts");
+    assert!(console.model.live.comparison.is_none());
+}

@@ -64,8 +64,9 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             require(model.trial_in_view().is_some(), &model.session.no_trial_yet())
         }
         A::Ghost => {
-            // Of a trial of another session it says where that is.
-            let known = model.history.traces().next().is_some() || model.session.trials.best().is_some();
+            // Of a trial of another session it says where that is; a replay reads it.
+            let recorded = model.timeline.as_ref().is_some_and(|timeline| !timeline.trials.is_empty());
+            let known = recorded || model.history.traces().next().is_some() || model.session.trials.best().is_some();
             require(known, "no jump has been recorded yet")
         }
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {

@@ -44,7 +44,7 @@ pub enum Msg {
     /// One of the ticks for the charts.
     Tick(Box<Tick>),
     Record(Stamped),
-    /// The jump of a trial of an earlier session, every fifth tick.
+    /// The jump of a trial of an earlier session, or one that a replay was asked for; every fifth tick.
     EarlierJump {
         trial: u32,
         ticks: Vec<Tick>,
@@ -171,6 +171,8 @@ pub enum ReplayCommand {
     Beside(u32),
     /// No trial beside another any longer.
     EndBeside,
+    /// Read the whole jump of a trial, to lay it under the charts.
+    Lay(u32),
 }
 
 /// Length of a single step.

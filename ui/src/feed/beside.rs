@@ -89,12 +89,7 @@ impl TrialPair {
     }
 
     fn read(&mut self, recording: &Timeline, first: &TrialRun, second: &TrialRun) -> Result<SideBySide, String> {
-        let failed = |error: RecordingError| error.to_string();
-        let own = match &mut self.own {
-            Some(own) => own,
-            None => self.own.insert(Timeline::open(&recording.paths()).map_err(failed)?),
-        };
-        own.refresh().map_err(failed)?;
+        let own = opened(&mut self.own, recording)?;
         let (ticks_a, a) = (ticks(own, first), compared(own, first.trial, false));
         let (ticks_b, b) = match &mut self.second {
             Some(other) => (ticks(other, second), compared(other, second.trial, true)),
@@ -103,11 +98,36 @@ impl TrialPair {
         for (ticks, trial) in [(&ticks_a, &a), (&ticks_b, &b)] {
             if ticks.is_empty() {
                 let place = trial.recording.as_ref().map_or(String::new(), |name| format!(" of {name}"));
-                return Err(format!("no tick of trial {}{place} can be read: nothing to lay beside", trial.trial));
+                return Err(unread(trial.trial, &place));
             }
         }
         Ok(SideBySide { a, b, ticks_a, ticks_b })
     }
+
+    /// Returns every fifth tick of a trial of the played recording, wherever the playhead is.
+    ///
+    /// # Errors
+    /// When none can be read.
+    pub fn jump_of(&mut self, recording: &Timeline, trial: u32) -> Result<Vec<Tick>, String> {
+        let run = recording.trials().iter().rev().find(|run| run.trial == trial).ok_or_else(|| unread(trial, ""))?;
+        let ticks = ticks(opened(&mut self.own, recording)?, run);
+        if ticks.is_empty() { Err(unread(trial, "")) } else { Ok(ticks) }
+    }
+}
+
+/// The played recording once more, as it is now.
+fn opened<'a>(own: &'a mut Option<Timeline>, recording: &Timeline) -> Result<&'a mut Timeline, String> {
+    let failed = |error: RecordingError| error.to_string();
+    let own = match own {
+        Some(own) => own,
+        None => own.insert(Timeline::open(&recording.paths()).map_err(failed)?),
+    };
+    own.refresh().map_err(failed)?;
+    Ok(own)
+}
+
+fn unread(trial: u32, place: &str) -> String {
+    format!("no tick of trial {trial}{place} can be read: nothing to lay beside")
 }
 
 fn name_of(recording: &Timeline) -> String {

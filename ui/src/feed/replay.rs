@@ -175,6 +175,10 @@ impl ReplayFeed {
             }
             ReplayCommand::Beside(trial) => self.pair.choose(trial),
             ReplayCommand::EndBeside => self.pair.end(),
+            ReplayCommand::Lay(trial) => self.jumped.push(match self.pair.jump_of(&self.recording, trial) {
+                Ok(ticks) => Msg::EarlierJump { trial, ticks },
+                Err(reason) => logged(at, reason),
+            }),
         }
     }
 
@@ -394,9 +398,9 @@ impl ReplayFeed {
     fn jump(&mut self, time_ns: u64) {
         let time_ns = time_ns.min(self.recording.duration_ns());
         let from_ns = time_ns.saturating_sub(PAST_NS);
-        // What a jump before this one has left is out of date, but for the list of trials.
-        let mut messages: Vec<Msg> =
-            self.jumped.drain(..).filter(|message| matches!(message, Msg::Timeline(_))).collect();
+        // What a jump before this one has left is out of date, but for the list of trials and a jump for the charts.
+        let stays = |message: &Msg| matches!(message, Msg::Timeline(_) | Msg::EarlierJump { .. });
+        let mut messages: Vec<Msg> = self.jumped.drain(..).filter(stays).collect();
         messages.push(Msg::Rewound);
         if self.follow_in_ns.is_none() {
             messages.extend(self.recording.cuts().into_iter().map(|cut| logged(0, cut)));

@@ -21,7 +21,7 @@ pub struct Comparison {
 impl Comparison {
     /// The traces of two trials; none where one of them has no recorded signals.
     pub fn new(history: &SignalHistory, a: ComparedTrial, b: ComparedTrial) -> Option<Comparison> {
-        Comparison::of(history.trace(a.trial)?, history.trace(b.trial)?.to_vec(), a, b)
+        Comparison::of(history.jump(a.trial)?, history.jump(b.trial)?.to_vec(), a, b)
     }
 
     /// The traces of the ticks of two recorded trials; none without ticks of A.

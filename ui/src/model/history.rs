@@ -153,6 +153,8 @@ pub struct SignalHistory {
     samples: VecDeque<ChartSample>,
     /// Shared with frozen copies of this history.
     traces: BTreeMap<u32, Arc<Vec<ChartSample>>>,
+    /// The newest traces that were read from the recording of a replay, as far as it goes: at most two.
+    read: Vec<(u32, Arc<Vec<ChartSample>>)>,
     /// The trial whose trace is kept however old it is.
     kept: Option<u32>,
     /// The trial of the newest sample that has one.
@@ -238,6 +240,15 @@ impl SignalHistory {
         }
     }
 
+    /// Adds the trace of a trial as the recording of a replay holds it.
+    pub fn read_trace(&mut self, trial: u32, ticks: &[Tick]) {
+        self.read.retain(|(of, _)| *of != trial);
+        if self.read.len() == 2 {
+            self.read.remove(0);
+        }
+        self.read.push((trial, Arc::new(ticks.iter().map(ChartSample::from).collect())));
+    }
+
     /// Keeps the trace of a trial, the best, however old it is.
     pub fn keep(&mut self, trial: Option<u32>) {
         self.kept = trial;
@@ -286,6 +297,18 @@ impl SignalHistory {
     /// The trace of a trial, countdown to end.
     pub fn trace(&self, trial: u32) -> Option<&[ChartSample]> {
         self.traces.get(&trial).map(|trace| trace.as_slice())
+    }
+
+    /// The trace of a trial, of a replay as far as it was recorded: the longer one where it was played in part and read.
+    pub fn whole(&self, trial: u32) -> Option<&[ChartSample]> {
+        let read = self.read.iter().filter(|(of, _)| *of == trial).map(|(_, trace)| trace);
+        let end_ns = |trace: &&Arc<Vec<ChartSample>>| trace.last().map(|sample| sample.time_ns);
+        self.traces.get(&trial).into_iter().chain(read).max_by_key(end_ns).map(|trace| trace.as_slice())
+    }
+
+    /// [`SignalHistory::whole`] of a trial that has reached its impulse.
+    pub fn jump(&self, trial: u32) -> Option<&[ChartSample]> {
+        self.whole(trial).filter(|trace| trace.last().is_some_and(|last| last.trial_time_s >= 0.0))
     }
 
     /// The trials that have a trace.

@@ -85,6 +85,10 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
             beside::follow(model, &status);
             model.replay = Some(status);
         }
+        Msg::EarlierJump { trial, ticks } if model.replay.is_some() => {
+            model.history.read_trace(trial, &ticks);
+            return beside::lay(model, trial);
+        }
         Msg::EarlierJump { trial, ticks } => model.history.add_trace(trial, &ticks),
         Msg::Answer(text) => reply(model, LogLevel::Info, text),
         Msg::Rejudged(news) => rejudged::apply(model, news),

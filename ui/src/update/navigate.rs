@@ -1,16 +1,12 @@
-//! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, ghosts, sorting and filtering.
-
-use std::path::Path;
+//! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, sorting and filtering.
 
 use quadfrog::recording::record::LogLevel;
-use quadfrog::trial::{TrialRecord, Verdict};
+use quadfrog::trial::Verdict;
 use strum::VariantArray;
 
 use super::request::reply;
 use crate::action::Action;
 use crate::column::Column;
-use crate::message::ComparedTrial;
-use crate::model::comparison::Comparison;
 use crate::model::live::Panel;
 use crate::model::trials::SortBy;
 use crate::model::{Model, View};
@@ -112,89 +108,6 @@ pub(super) fn zoom(model: &mut Model, factor: f64) {
         return;
     }
     model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
-}
-
-/// Lays a trial under the charts of a jump: the selected one in Trials, else the best. In Trials a second one compares the
-/// two; the same again, or the key in Live, ends it.
-pub(super) fn ghost(model: &mut Model) {
-    let text = match (model.view, model.live.ghost, model.live.comparison.is_some()) {
-        (View::Trials, Some(a), false) => second_ghost(model, a),
-        (View::Trials, _, _) => {
-            model.live.comparison = None;
-            first_ghost(model, model.selected_trial().map(|trial| trial.trial))
-        }
-        (_, None, false) => first_ghost(model, model.session.trials.best().map(|trial| trial.trial)),
-        _ => no_ghost(model),
-    };
-    reply(model, LogLevel::Info, text);
-}
-
-pub(super) fn no_ghost(model: &mut Model) -> String {
-    model.live.ghost = None;
-    model.live.comparison = None;
-    "no trial is laid under the charts".to_owned()
-}
-
-fn first_ghost(model: &mut Model, trial: Option<u32>) -> String {
-    model.live.ghost = trial.filter(|trial| model.history.trace(*trial).is_some());
-    match (model.live.ghost, trial) {
-        (Some(a), _) => {
-            let comparable = model.history.traces().any(|trial| trial != a);
-            let key = model.keymap.key(Action::Ghost);
-            let second = match comparable {
-                true => format!("; {key} on another row of Trials compares the two"),
-                false => String::new(),
-            };
-            format!("trial {a} is laid under the charts of a jump{second}")
-        }
-        (None, Some(trial)) => no_signals(model, trial),
-        (None, None) => "no trial was accepted yet".to_owned(),
-    }
-}
-
-/// Returns the reason for which the signals of a trial are not here, and the place where they are.
-fn no_signals(model: &Model, trial: u32) -> String {
-    if model.trial(trial).is_some_and(TrialRecord::was_not_run) {
-        return format!("trial {trial} was not run");
-    }
-    if let Some(timeline) = &model.timeline {
-        return match timeline.has_ticks_of(trial) {
-            true => {
-                format!("trial {trial} was not played; {} on its row goes to it", model.keymap.key(Action::Open))
-            }
-            false => format!("the recording has no ticks of trial {trial}"),
-        };
-    }
-    let study = Path::new(&model.session.info.study).parent().unwrap_or(Path::new("")).display();
-    match model.session.trials.ran.contains_key(&trial) {
-        true => format!("the signals of trial {trial} are not kept any longer: quadfrog replay {study} shows them"),
-        false => format!("trial {trial} was recorded in another session: quadfrog replay {study} shows it"),
-    }
-}
-
-/// Returns the keys of two trials that are laid over each other, in words.
-pub(super) fn keys_of_comparison(model: &Model) -> String {
-    let [left, right, end] =
-        [Action::Left, Action::Right, Action::EndComparison].map(|action| model.keymap.key(action));
-    format!("{left} and {right} move the cursor, {end} ends it")
-}
-
-fn second_ghost(model: &mut Model, a: u32) -> String {
-    let Some(b) = model.selected_trial().map(|trial| trial.trial).filter(|b| *b != a) else { return no_ghost(model) };
-    let compared = |trial: u32| ComparedTrial {
-        trial,
-        row: model.final_row(trial).cloned(),
-        unit: model.session.info.unit.clone(),
-        recording: None,
-    };
-    model.live.comparison = Comparison::new(&model.history, compared(a), compared(b));
-    match model.live.comparison {
-        Some(_) => {
-            let live = model.keymap.key(Action::LiveView);
-            format!("A is trial {a}, B is trial {b}: {live} shows both in Live; there {}", keys_of_comparison(model))
-        }
-        None => no_signals(model, b),
-    }
 }
 
 /// The next set of series: attitude and feet, forces, motion of the trunk, torques of the joints, and the joints in numbers.

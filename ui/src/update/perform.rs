@@ -10,7 +10,7 @@ use quadfrog::trial::{ExperimentStage, Proposal, Verdict, six_digits};
 use strum::VariantArray;
 
 use super::beside;
-use super::navigate::{filter, freeze, ghost, move_by, move_cursor, next_mode, next_series, next_sort, no_ghost, zoom};
+use super::navigate::{filter, freeze, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::rejudged;
 use super::request::{drop_answer, interrupt, reply, request, stop};
 use crate::action::Action;
@@ -150,10 +150,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Series if model.view == View::Health => model.health_history_shown = !model.health_history_shown,
         Action::Series => next_series(model),
         Action::ChooseSeries => open(model, Dialog::Choose { subject: Choice::Series, selected: 0 }),
-        Action::Ghost => {
-            ghost(model);
-            return beside::ended(model);
-        }
+        Action::Ghost => return beside::ghost(model),
         Action::Sort => next_sort(model),
         Action::Reverse => model.trial_table.reversed = !model.trial_table.reversed,
         Action::Filter => filter(model),
@@ -201,7 +198,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Rejudge => return rejudged::toggle(model),
         Action::Beside => return beside::begin(model),
         Action::EndComparison => {
-            no_ghost(model);
+            beside::no_ghost(model);
             reply(model, LogLevel::Info, "no trial is beside another any longer");
             return beside::ended(model);
         }

@@ -169,7 +169,7 @@ impl<'a> ChartSource<'a> {
             window_ns: (model.live.window_s * 1e9) as u64,
             newest_ns: history.newest_ns(),
         };
-        let trace = model.live.ghost.and_then(|trial| model.history.trace(trial));
+        let trace = model.live.ghost.and_then(|trial| model.history.jump(trial));
         let under = history.samples().rev().find(|sample| sample.trial.is_some()).map(impulse_start_ns);
         let ghost =
             trace.zip(under).map(|(trace, start_ns)| Ghost { trace, start_ns, role: Role::Ghost, named: false });

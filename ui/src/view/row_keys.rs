@@ -32,11 +32,11 @@ fn of_comparison(model: &Model) -> Vec<(String, String)> {
 fn of_row(model: &Model) -> Vec<(String, String)> {
     let Some(trial) = model.selected_trial().map(|row| row.trial) else { return Vec::new() };
     let key = |action| model.keymap.key(action);
-    let goes_there = model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial))
-        && model.snapshot.tick.trial != Some(trial);
+    let recorded = model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial));
+    let goes_there = recorded && model.snapshot.tick.trial != Some(trial);
     let open = if goes_there { "go to it" } else { "open" };
     let mut keys = vec![(key(Action::Open), open.to_owned())];
-    if model.history.trace(trial).is_some() {
+    if recorded || model.history.jump(trial).is_some() {
         let same = model.live.comparison.is_none() && model.live.ghost == Some(trial);
         keys.push((key(Action::Ghost), if same { "clear" } else { "compare" }.to_owned()));
     }
