@@ -119,3 +119,49 @@ fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
     let report = quadfrog(folder.path(), &["report", study]);
     assert!(report.contains("accept, J by hand, best"), "{report}");
 }
+
+/// Regression: under automatic approval an edit in the table of a finished study made the robot arm itself and jump.
+#[test]
+fn a_changed_verdict_of_a_finished_study_moves_no_robot() {
+    let folder = tempfile::tempdir().expect("a folder");
+    quadfrog(folder.path(), &["optimize", "--trials", "3", "--seed", "0", "--output", "studies"]);
+    let study = study_in(&folder.path().join("studies"));
+    let arguments = ["--resume", study.to_str().expect("a path"), "--approve", "auto"];
+    let mut session = Session::start(folder.path(), (120, 40), &arguments);
+    session.wait_for(&["The study is finished.", "3 of 3 counted"]);
+    session.send("2\x1b[Hv");
+    session.wait_for(&["becomes void. Why?", "has room for a further trial, which waits for A"]);
+    session.send("slipped\r");
+    let words = |session: &Session| session.screen().split_whitespace().collect::<Vec<_>>().join(" ");
+    session.wait_until("the answer", || words(&session).contains("the study has room again: trial 3 waits for you"));
+    session.wait_for(&["DISARMED", "2 of 3 counted", "Press A to arm"]);
+    // The rule goes on with the operator's key.
+    session.send("1A");
+    session.wait_for(&["The study is finished.", "3 of 3 counted"]);
+    assert!(session.quit().success());
+}
+
+/// Regression: a fix that was used up came back with a changed verdict, and no answer said so.
+#[test]
+fn the_answer_to_a_changed_verdict_says_that_a_fixed_parameter_holds_for_one_more() {
+    let folder = tempfile::tempdir().expect("a folder");
+    quadfrog(folder.path(), &["optimize", "--trials", "2", "--seed", "0", "--output", "studies"]);
+    let study = study_in(&folder.path().join("studies"));
+    let study = study.to_str().expect("a path");
+    let mut session = Session::start(folder.path(), (120, 40), &["--resume", study, "--trials", "5"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("4X");
+    session.wait_for(&["Fix f0 at", "for how many trials?"]);
+    session.send("\x151\r");
+    session.wait_for(&["fixed at", "1 more"]);
+    assert!(session.quit().success());
+    quadfrog(folder.path(), &["optimize", "--resume", study, "--trials", "5"]);
+    let mut session = Session::start(folder.path(), (120, 40), &["--resume", study]);
+    session.wait_for(&["The study is finished."]);
+    // Trial 2 had the fixed value.
+    session.send("2\x1b[H\x1b[B\x1b[Bv");
+    session.wait_for(&["Trial #2: ", "becomes void. Why?"]);
+    session.send("slipped\r");
+    session.wait_for(&["both; f0 ", " Hz fixed, 1 more"]);
+    assert!(session.quit().success());
+}

@@ -1,12 +1,14 @@
 //! Changes of the proposal, the search and the queue by the operator. Each request is checked; a refusal names the limit.
 //! Nothing runs before it is approved.
 
+use std::collections::BTreeMap;
+
 use super::attributes::{self, BudgetAttribute, Origin};
 use super::changes::Changes;
 use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
 use super::{Experiment, ExperimentState, confirmation, envelope};
-use crate::trial::{ParameterInfo, ParameterValues, ProposalSource, QueuedPoint, six_digits};
+use crate::trial::{FixedParameter, ParameterInfo, ParameterValues, ProposalSource, QueuedPoint, six_digits};
 
 /// A point that the operator has queued.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +49,11 @@ impl Experiment {
         self.change_open(Changes::default())
     }
 
+    /// Returns the parameters that are fixed for the next trial, with the number of trials left.
+    pub fn fixed(&self) -> BTreeMap<String, FixedParameter> {
+        self.search.fixed(self.study.trials())
+    }
+
     /// Returns the values of a queued point in words, with units.
     pub fn in_words(&self, point: &QueuedPoint) -> String {
         point.in_words(self.plan.parameters.iter().chain(&self.plan.gains))
@@ -82,7 +89,7 @@ impl Experiment {
         if trials == 0 {
             return not_now("fix it for one trial at least");
         }
-        let others = self.search.fixed(self.study.trials());
+        let others = self.fixed();
         let free = bounds.iter().any(|p| p.name != name && p.low < p.high && !others.contains_key(&p.name));
         if !free {
             return not_now(format!("with {name} fixed nothing would be left to search; queue the point instead"));
@@ -123,7 +130,7 @@ impl Experiment {
                 "{name} from {low} to {high} {unit} is wider than safety.toml allows: {least} to {most} {unit}"
             ));
         }
-        if let Some(fixed) = self.search.fixed(self.study.trials()).get(name)
+        if let Some(fixed) = self.fixed().get(name)
             && !(fixed.value >= low && fixed.value <= high)
         {
             return not_now(format!(
@@ -163,7 +170,7 @@ impl Experiment {
         let (parameters, gains) = (ParameterValues::from(parameters), ParameterValues::from(gains));
         let twin = |queued: &QueuedPoint| queued.parameters == parameters && queued.gains == gains;
         let same = queued_points(&self.study).into_iter().find(twin).map(|queued| queued.trial);
-        let fixed = self.search.fixed(self.study.trials());
+        let fixed = self.fixed();
         let differs = |name: &str, fixed: f64| parameters.get(name).is_some_and(|value| value != fixed);
         let not_fixed = fixed.into_iter().map(|(name, fixed)| (name, fixed.value));
         let not_fixed = not_fixed.filter(|(name, fixed)| differs(name, *fixed)).collect();

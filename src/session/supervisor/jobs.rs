@@ -96,6 +96,7 @@ impl Supervisor {
     fn finish(&mut self, purpose: JobPurpose, output: JobOutput, time_ns: u64) {
         match (purpose, output) {
             (JobPurpose::Request(stamped, asker), JobOutput::Answer(answer)) => {
+                self.unattended.answered(&stamped.request, answer.is_ok());
                 self.respond(&stamped, asker, answer, time_ns);
             }
             (JobPurpose::Request(stamped, asker), JobOutput::Judged(answer, over)) => {

@@ -1,9 +1,11 @@
 //! Requests that change the study, as jobs on the experiment.
 
+use std::collections::BTreeMap;
+
 use crate::session::experiment::{Experiment, RequestRefusal};
 use crate::session::operator_request::{OperatorRequest, counted};
 use crate::session::storage::JobOutput;
-use crate::trial::{Verdict, six_digits};
+use crate::trial::{ExperimentStage, FixedParameter, Verdict, four_digits, parameter_unit, six_digits};
 
 /// Carries out a request. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
@@ -41,6 +43,8 @@ struct Before {
     changed: Option<u32>,
     /// Number and proposed values of the open proposal, for a request that may draw it again.
     drawn: Option<(u32, Vec<f64>)>,
+    /// The fixed parameters and whether the study is finished, for a changed verdict.
+    counts: Option<(BTreeMap<String, FixedParameter>, bool)>,
 }
 
 impl Before {
@@ -48,7 +52,9 @@ impl Before {
         use OperatorRequest::{ChangeVerdict, Fix, NarrowBounds, Unfix};
         let searches = matches!(request, Fix { .. } | Unfix { .. } | NarrowBounds { .. } | ChangeVerdict { .. });
         let drawn = if searches { drawn(experiment) } else { None };
-        Before { undoable: experiment.undoable(), changed: experiment.changed_proposal(), drawn }
+        let counts = matches!(request, ChangeVerdict { .. })
+            .then(|| (experiment.fixed(), experiment.stage() == ExperimentStage::Finished));
+        Before { undoable: experiment.undoable(), changed: experiment.changed_proposal(), drawn, counts }
     }
 }
 
@@ -75,8 +81,29 @@ fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: 
     {
         text += &format!("; proposal {trial} is drawn again");
     }
+    if let Some((fixed, finished)) = &before.counts {
+        text += &of_changed_count(experiment, fixed, *finished);
+    }
     if let Some(conclusion) = experiment.take_conclusion() {
         text += &format!("; {conclusion}");
+    }
+    text
+}
+
+/// Returns in words what follows from another number of trials that count: fixed parameters, room in a finished study.
+fn of_changed_count(experiment: &Experiment, fixed: &BTreeMap<String, FixedParameter>, finished: bool) -> String {
+    let mut text = String::new();
+    let now = experiment.fixed();
+    for (name, FixedParameter { value, trials }) in now.iter().filter(|(name, now)| fixed.get(*name) != Some(now)) {
+        let unit =
+            Some(parameter_unit(name)).filter(|unit| !unit.is_empty()).map_or(String::new(), |u| format!(" {u}"));
+        text += &format!("; {name} {}{unit} fixed, {trials} more", four_digits(*value));
+    }
+    for name in fixed.keys().filter(|name| !now.contains_key(*name)) {
+        text += &format!("; {name} is searched again");
+    }
+    if let Some(proposal) = experiment.proposal().filter(|_| finished) {
+        text += &format!("; the study has room again: trial {} waits for you", proposal.trial);
     }
     text
 }

@@ -1,7 +1,7 @@
 //! Automatic approval and judgement, if the session was started with `falls-only` or `auto`.
 //!
-//! The operator has precedence: after STOP, a fault, a cancelled countdown, an undone verdict or a request to sit down the
-//! automatic rule pauses until a person arms or approves again. It never acknowledges a stop.
+//! The operator has precedence: after STOP, a fault, a cancelled countdown, an undone or changed verdict or a request to sit down
+//! the automatic rule pauses until a person arms or approves again. It never acknowledges a stop.
 
 use crate::session::operator_request::OperatorRequest;
 use crate::telemetry::{Mode, TransitionCause};
@@ -49,5 +49,10 @@ impl Unattended {
             OperatorRequest::Arm | OperatorRequest::Approve { .. } => self.paused = false,
             _ => {}
         }
+    }
+
+    /// Pauses the rule after a changed verdict: a finished study may have room for another trial then, and the robot is at rest.
+    pub fn answered(&mut self, request: &OperatorRequest, accepted: bool) {
+        self.paused |= accepted && matches!(request, OperatorRequest::ChangeVerdict { .. });
     }
 }

@@ -203,6 +203,13 @@ impl SessionModel {
         }
     }
 
+    /// Whether another verdict of a trial lets a finished study run one more.
+    pub fn makes_room(&self, trial: u32, verdict: Verdict) -> bool {
+        let counts = self.trials.records.get(&trial).is_some_and(TrialRecord::counts);
+        let full = self.counted() == self.budget() as usize;
+        self.stage_is(ExperimentStage::Finished) && verdict == Verdict::Void && counts && full
+    }
+
     /// The leading point of a confirmation of the best: with its confidence while it runs, afterwards without one, too.
     pub fn leading_point(&self) -> Option<&PointRecord> {
         let points = &self.trials.points;

@@ -10,6 +10,7 @@
 //! ```
 
 use quadfrog::session::operator_request::{OperatorCheck, counted};
+use quadfrog::telemetry::Mode;
 use quadfrog::trial::{Task, six_digits};
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -327,8 +328,13 @@ fn field(
             "the robot is energised: Space is STOP, _ writes a space".to_owned()
         }
         Purpose::VoidReason { .. } => "it tripped a limit: by the rules that is a fall of its parameters".to_owned(),
-        Purpose::ChangeVerdict { .. } => {
-            "the sampler proposes again from the changed trials; the journal keeps the old verdict".to_owned()
+        Purpose::ChangeVerdict { trial, verdict } => {
+            let key = model.keymap.key(if model.mode() == Mode::Ready { Action::Approve } else { Action::Arm });
+            let room = match model.session.makes_room(trial, verdict) {
+                true => format!("; the study then has room for a further trial, which waits for {key}"),
+                false => String::new(),
+            };
+            format!("the sampler proposes again from the changed trials; the journal keeps the old verdict{room}")
         }
         Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
     };
