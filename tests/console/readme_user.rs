@@ -255,9 +255,9 @@ fn the_nearest_fall_leaves_the_chart_its_axis() {
     let long = "a report of the session that is longer than the eighty columns of a small terminal are wide";
     console.record(Record::Log(LogRecord { level: LogLevel::Warning, source: "test".into(), message: long.into() }));
     for (falls, text) in [(0, "none of the 5 nearest trials"), (2, "2 of the 5 nearest trials fell;")] {
-        let risk = FallRisk { falls, neighbours: 5, nearest_fall: Some(0.25), nearest_fall_trial: Some(12) };
+        let risk = FallRisk { falls, neighbours: 5, nearest_fall: Some(1.06), nearest_fall_trial: Some(112) };
         let screen = with(&mut console, Some(risk));
-        assert_shows(&screen, &[text, "nearest fall #12 at 0.25", "columns of a small", "#19"]);
+        assert_shows(&screen, &[text, "nearest fall #112: 106 %", "columns of a small", "#19"]);
     }
 }
 

@@ -107,7 +107,7 @@ pub fn details(
     if let Some(risk) = trial.risk.filter(|risk| risk.neighbours > 0) {
         let nearest = match (risk.nearest_fall_trial, risk.nearest_fall) {
             (Some(trial), Some(distance)) => {
-                format!("; nearest fall #{trial}, {distance:.3} away (1: the whole range of a parameter)")
+                format!("; nearest fall #{trial}, {:.1} % of a range away", 100.0 * distance)
             }
             _ => String::new(),
         };

@@ -161,10 +161,10 @@ fn risk(theme: &Theme, risk: Option<FallRisk>, width: usize) -> Line<'static> {
     let role = if risk.falls * 2 >= risk.neighbours { Role::Warning } else { Role::Quiet };
     let mut text = format!(" {}", falls_near(&risk));
     if let (Some(distance), Some(trial)) = (risk.nearest_fall, risk.nearest_fall_trial) {
-        // In few columns two lines; the details of the trial explain the distance.
+        // In few columns two lines; the manual explains the distance.
         let place = match width >= points::WORDS_FROM {
-            true => format!(", {distance:.2} away (1: a range)"),
-            false => format!(" at {distance:.2}"),
+            true => format!(", {:.0} % of a range away", 100.0 * distance),
+            false => format!(": {:.0} %", 100.0 * distance),
         };
         text.push_str(&format!("; nearest fall #{trial}{place}"));
     }
