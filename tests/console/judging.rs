@@ -505,6 +505,13 @@ fn the_line_after_a_stop_names_the_rerun_and_that_of_undo_its_trial() {
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
     console.mode(Mode::Disarmed);
     assert_shows(console.screen(120, 40).lines().last().unwrap(), &["u undo #0"]);
+    // Regression: at 80 columns the row of the last trial, where other verdicts are refused, hid it behind the help.
+    console.mode(Mode::Ready);
+    console.press(&["2", "Home"]);
+    let last = console.screen(80, 24).lines().last().unwrap().to_owned();
+    assert_shows(&last, &["Enter open", "u undo #0"]);
+    assert_eq!(last.matches("undo").count(), 1, "{last}");
+    assert_eq!(console.screen(160, 40).lines().last().unwrap().matches("undo").count(), 1);
 }
 
 /// Regression: Esc with nothing to close said that no trial is beside another, and hid the message before it.

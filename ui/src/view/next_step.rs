@@ -36,6 +36,7 @@ pub fn next_step(model: &Model) -> NextStep {
     }
     // Before the keys of the next step, but a verdict comes first.
     let keys = row_keys::keys(model);
+    next.others.retain(|other| !keys.contains(other));
     let at = if is_asked(model) { next.others.len() } else { 0 };
     next.others.splice(at..at, keys);
     next

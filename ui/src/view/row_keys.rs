@@ -45,6 +45,10 @@ fn of_row(model: &Model) -> Vec<(String, String)> {
         return keys;
     }
     let accepted = |action: &Action| legal(*action, model).is_ok();
+    // Undo takes the place of the verdicts of the last judged row.
+    if model.session.undoable() == Some(trial) && accepted(&Action::Undo) {
+        keys.push((key(Action::Undo), format!("undo #{trial}")));
+    }
     let verdicts: Vec<String> =
         [Action::Accept, Action::Fall, Action::Void].into_iter().filter(accepted).map(key).collect();
     if !verdicts.is_empty() {
