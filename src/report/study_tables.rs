@@ -32,8 +32,12 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
     let columns = [Column::text("study")].into_iter().chain(counts);
     let columns = columns.chain([Column::number("best J", if several_units { "" } else { unit })]);
     let columns = columns.chain(several_units.then(|| Column::text("unit"))).chain([Column::number("trial", "")]);
-    let caption = "Studies. Accepted trials and falls count; repeats that confirm the best and void trials do not. \
-                   A proposal that was not run is no trial.";
+    let sum = |count: fn(&ReportedStudy) -> usize| studies.iter().map(count).sum::<usize>();
+    let (trials, counted) = (sum(|study| study.trials().count()), sum(|study| study.counted().count()));
+    let caption = format!(
+        "Studies. {trials} trials, {counted} counted: repeats that confirm the best and void trials do not count. A proposal that \
+         was not run is no trial."
+    );
     let mut table = Table::new(caption, columns);
     for study in studies {
         let counted = |verdict| Cell::count(study.counted().filter(|row| row.verdict == Some(verdict)).count());

@@ -148,6 +148,8 @@ fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {
         let numbers: Vec<&str> = row.split_whitespace().skip_while(|word| word.parse::<u32>() != Ok(6)).collect();
         // Trials, accepted, falls, repeats, void.
         assert_eq!(numbers[..5], ["6", "3", "1", "1", "1"], "{results}");
+        let (trials, counted) = (6 * studies.len(), 4 * studies.len());
+        assert!(results.contains(&format!("{trials} trials, {counted} counted")), "{results}");
     }
 }
 
