@@ -115,6 +115,8 @@ fn a_new_configuration_is_valid_and_differs_in_nothing_until_it_is_edited() {
     let back = "safety.toml  parameters.Fx: [0.0, 400.0] -> [0.0, 200.0]\n";
     program.write("empty/safety.toml", "");
     assert_eq!(program.text(&["config", "diff", "empty", "home/quadfrog"]), back);
+    // Regression: `--config` of the other commands was an error.
+    assert_eq!(program.text(&["config", "diff", "--config", "home/quadfrog"]), differences);
     assert_shows(&program.text(&["config", "check", "home/quadfrog"]), &["simulator: all", "hardware: refused", "Fx"]);
     assert_shows(
         &program.refused(&["config", "check", "home/quadfrog", "--hardware"]),

@@ -47,6 +47,9 @@ enum ConfigSubcommand {
         /// Folder to compare with [default: the built-in configuration]
         #[arg(value_name = "OTHER")]
         other: Option<PathBuf>,
+        /// DIR, as for other commands
+        #[arg(long, value_name = "DIR", conflicts_with = "folder")]
+        config: Option<PathBuf>,
         /// Robot model whose own configuration lies under that of DIR: go1, a1, go2, or a folder with a URDF and a robot.toml
         #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
         model: String,
@@ -85,7 +88,9 @@ enum ConfigSubcommand {
 pub fn run(command: &ConfigCommand) -> Result<(), Failure> {
     match &command.command {
         ConfigSubcommand::Show { what, config, model } => show(what, config.as_deref(), model),
-        ConfigSubcommand::Diff { folder, other, model } => differences(folder.as_deref(), other.as_deref(), model),
+        ConfigSubcommand::Diff { folder, other, config, model } => {
+            differences(folder.as_deref().or(config.as_deref()), other.as_deref(), model)
+        }
         ConfigSubcommand::Check { folder, model, hardware } => check(folder.as_deref(), model, *hardware),
         ConfigSubcommand::Init { folder } => init(folder.as_deref()),
         ConfigSubcommand::Schema { file, output } => write_schemas(file.as_deref(), output.as_deref()),
