@@ -47,6 +47,11 @@ fn relative(found: &[f64], expected: &Value) -> f64 {
 #[test]
 fn golden_dynamics() {
     let model = RobotModel::new(&RobotDescription::embedded("go1").unwrap());
+    compare_with_pinocchio(&model);
+    compare_with_pinocchio(&model.with_baseline_instructions());
+}
+
+fn compare_with_pinocchio(model: &RobotModel) {
     let file = golden::<Value>("dynamics.json");
     let cases = file["cases"].as_array().unwrap();
     assert!(!cases.is_empty());

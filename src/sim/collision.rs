@@ -10,7 +10,7 @@ use super::config::{BodyKind, SimConfig, TerrainKind};
 use super::contact::{ContactPoint, ContactSolver};
 use super::dynamics::LegDynamics;
 use super::motion::{GeneralizedVelocity, StepContext, TRUNK};
-use super::quantities::split;
+use super::six::split;
 use super::state::SimState;
 use super::terrain::{MAX_TERRAIN_CONTACTS, Terrain, TerrainContact};
 use crate::robot::description::{CollisionShape, RigidBody, RobotDescription};

@@ -16,35 +16,36 @@
 //! Each leg is computed in the frame of its hip link, in which thigh and calf turn about the same fixed axis y.
 //! Six-vectors have the linear part first, in body axes at the trunk's origin.
 
+use fearless_simd::{Level, Simd};
 use nalgebra::{Matrix3, Vector3};
-use simba::simd::{SimdComplexField, SimdValue};
 
-use super::model::{Lanes, LegsModel, RobotModel};
-use super::six::{Cholesky6, Six};
-use super::spatial::{AxisRotation, SpatialForce, SpatialInertia, SpatialMotion};
+use super::lanes::{Lanes, Quad, with_lanes};
+use super::model::{LegsModel, RobotModel};
+use super::six::{Cholesky6, Six, split, stack};
+use super::spatial::{AxisRotation, Real, SpatialForce, SpatialInertia, SpatialMotion, cross};
 use super::state::{Acceleration, SimState};
-use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg};
+use crate::robot::{GRAVITY, Joints, LEGS, PerLeg, leg_of};
 
-/// Kinematics of all legs and their coupling to the trunk; one lane per leg.
+/// Kinematics of all legs and their coupling to the trunk. `T` is a number per leg.
 #[derive(Debug, Clone)]
-pub(super) struct LegLanes {
+pub(super) struct LegLanes<T> {
     /// Rotation of the hip link about x.
-    hip: AxisRotation<Lanes>,
+    hip: AxisRotation<T>,
     /// Rotation of thigh and calf about the hip link's y.
-    thigh: AxisRotation<Lanes>,
-    calf: AxisRotation<Lanes>,
+    thigh: AxisRotation<T>,
+    calf: AxisRotation<T>,
     /// Joint origins in the trunk's frame, m.
-    origin_body: [Vector3<Lanes>; 3],
+    origin_body: [Vector3<T>; 3],
     /// H: mass matrix of the leg's joints, kg m^2: 11, 12, 13, 22, 23, 33.
-    mass: [Lanes; 6],
+    mass: [T; 6],
     /// F: a column for each joint.
-    coupling: [[Lanes; 6]; 3],
+    coupling: [[T; 6]; 3],
     /// c: velocity and gravity terms, N m.
-    bias: [Lanes; 3],
+    bias: [T; 3],
     /// C^-1: inverse of the lower Cholesky factor of H: 11, 21, 22, 31, 32, 33.
-    factor_inverse: [Lanes; 6],
+    factor_inverse: [T; 6],
     /// G = H^-1 F^T: a row for each joint.
-    gain: [[Lanes; 6]; 3],
+    gain: [[T; 6]; 3],
 }
 
 /// Kinematics and factors of one leg.
@@ -64,42 +65,54 @@ pub(super) struct LegDynamics {
 /// Equations of motion at one state.
 #[derive(Debug, Clone)]
 pub(super) struct Dynamics {
-    legs: LegLanes,
+    legs: LegLanes<Quad>,
     /// I_0 as mass, first and second moment.
     pub composite: SpatialInertia<f64>,
     /// b of the trunk's rows.
     pub bias: Six,
     /// L: factor of I_A.
     pub factor: Cholesky6,
+    /// Instructions with which it is evaluated.
+    instructions: Level,
 }
 
-/// Returns the joints of all legs as lanes.
-#[inline]
-fn joint_lanes(x: &Joints) -> [Lanes; 3] {
-    let lanes = |i: usize| Lanes::from([x[i], x[3 + i], x[6 + i], x[9 + i]]);
+/// Loads the joints of all legs.
+#[inline(always)]
+fn joint_lanes<S: Simd>(simd: S, x: &Joints) -> [Lanes<S>; 3] {
+    let lanes = |i: usize| Lanes::new(simd, [x[i], x[3 + i], x[6 + i], x[9 + i]]);
     [lanes(0), lanes(1), lanes(2)]
 }
 
-impl LegLanes {
+/// Returns the joints of all legs from their numbers per leg.
+#[inline(always)]
+fn joints<S: Simd>([hip, thigh, calf]: [Lanes<S>; 3]) -> Joints {
+    let lanes = [hip.store().0, thigh.store().0, calf.store().0];
+    std::array::from_fn(|i| lanes[i % 3][i / 3])
+}
+
+impl<S: Simd> LegLanes<Lanes<S>> {
     /// Computes all legs; returns also their composite inertias and bias forces in the trunk's frame.
-    #[inline]
+    #[inline(always)]
     fn new(
+        simd: S,
         model: &LegsModel,
-        q: [Lanes; 3],
-        dq: [Lanes; 3],
-        added: [Lanes; 3],
-        trunk_velocity: &SpatialMotion<Lanes>,
-        gravity_body: &Vector3<Lanes>,
-    ) -> (LegLanes, SpatialInertia<Lanes>, SpatialForce<Lanes>) {
+        q: [Lanes<S>; 3],
+        dq: [Lanes<S>; 3],
+        added: [Lanes<S>; 3],
+        trunk_velocity: &SpatialMotion<Lanes<S>>,
+        gravity_body: &Vector3<Lanes<S>>,
+    ) -> (Self, SpatialInertia<Lanes<S>>, SpatialForce<Lanes<S>>) {
+        let load = |x: Quad| Lanes::load(simd, x);
         let (hip, thigh, calf) = (AxisRotation::new(q[0]), AxisRotation::new(q[1]), AxisRotation::new(q[1] + q[2]));
-        let origin_hip = model.joint_origin[0];
-        let origin_thigh = model.joint_origin[1];
-        let origin_calf = origin_thigh + thigh.rotate_y(&model.joint_origin[2]);
+        let [origin_hip, origin_thigh, origin_calf] = &model.joint_origin;
+        let (origin_hip, origin_thigh) = (origin_hip.map(load), origin_thigh.map(load));
+        let origin_calf = origin_thigh + thigh.rotate_y(&origin_calf.map(load));
 
         // Composite inertias about the hip's origin, hip axes (CRBA, Table 6.2: I^c).
-        let link_calf = model.inertia[2].rotated_y(calf).moved(&origin_calf);
-        let link_thigh = model.inertia[1].rotated_y(thigh).moved(&origin_thigh);
-        let link_hip = model.inertia[0];
+        let [link_hip, link_thigh, link_calf] = &model.inertia;
+        let (link_hip, link_thigh, link_calf) = (link_hip.map(load), link_thigh.map(load), link_calf.map(load));
+        let link_calf = link_calf.rotated_y(calf).moved(&origin_calf);
+        let link_thigh = link_thigh.rotated_y(thigh).moved(&origin_thigh);
         let composite_thigh = link_thigh.plus(&link_calf);
         let composite_hip = link_hip.plus(&composite_thigh);
 
@@ -113,7 +126,7 @@ impl LegLanes {
         // Newton-Euler with zero accelerations (Table 5.1): v_i = v_p + s_i dq_i,  a_i = a_p + v_i x s_i dq_i,
         // f_i = I_i a_i + v_i x* I_i v_i;  gravity enters as an upward acceleration of the trunk.
         let v0 = SpatialMotion {
-            linear: hip.unrotate_x(&(trunk_velocity.linear + trunk_velocity.angular.cross(&origin_hip))),
+            linear: hip.unrotate_x(&(trunk_velocity.linear + cross(&trunk_velocity.angular, &origin_hip))),
             angular: hip.unrotate_x(&trunk_velocity.angular),
         };
         let (v1, mut a1) = v0.across_joint_x(dq[0]);
@@ -126,11 +139,7 @@ impl LegLanes {
         let p2 = link_thigh.force(&v2, &a2).plus(&p3);
         let p1 = link_hip.force(&v1, &a1).plus(&p2);
 
-        let column = |f: &SpatialForce<Lanes>| {
-            let f = f.in_parent(hip, &origin_hip);
-            [f.linear.x, f.linear.y, f.linear.z, f.angular.x, f.angular.y, f.angular.z]
-        };
-        let coupling = [column(&f1), column(&f2), column(&f3)];
+        let coupling = [column(f1, hip, &origin_hip), column(f2, hip, &origin_hip), column(f3, hip, &origin_hip)];
         let mass = [h11, h12, h13, h22, h23, h33];
         let (factor_inverse, gain) = factor(&mass, &added, &coupling);
         let legs = LegLanes {
@@ -151,48 +160,91 @@ impl LegLanes {
         (legs, composite_hip.rotated_x(hip).moved(&origin_hip), p1.in_parent(hip, &origin_hip))
     }
 
-    /// H^-1 u = C^-T C^-1 u.
-    #[inline]
-    fn solve(&self, u: &[Lanes; 3]) -> [Lanes; 3] {
-        let [i11, i21, i22, i31, i32, i33] = self.factor_inverse;
-        let y1 = i11 * u[0];
-        let y2 = i21 * u[0] + i22 * u[1];
-        let y3 = i31 * u[0] + i32 * u[1] + i33 * u[2];
-        [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3]
+    /// Stores all numbers.
+    #[inline(always)]
+    fn store(&self, to: &mut LegLanes<Quad>) {
+        #[inline(always)]
+        fn store<S: Simd>(lanes: &[Lanes<S>], to: &mut [Quad]) {
+            for (to, lanes) in to.iter_mut().zip(lanes) {
+                *to = lanes.store();
+            }
+        }
+        (to.hip, to.thigh, to.calf) =
+            (self.hip.map(Lanes::store), self.thigh.map(Lanes::store), self.calf.map(Lanes::store));
+        for (to, origin) in to.origin_body.iter_mut().zip(&self.origin_body) {
+            *to = origin.map(Lanes::store);
+        }
+        store(&self.mass, &mut to.mass);
+        store(self.coupling.as_flattened(), to.coupling.as_flattened_mut());
+        store(&self.bias, &mut to.bias);
+        store(&self.factor_inverse, &mut to.factor_inverse);
+        store(self.gain.as_flattened(), to.gain.as_flattened_mut());
+    }
+}
+
+impl LegLanes<Quad> {
+    /// C^-1.
+    #[inline(always)]
+    fn factor_inverse<S: Simd>(&self, simd: S) -> [Lanes<S>; 6] {
+        let load = |i: usize| Lanes::load(simd, self.factor_inverse[i]);
+        [load(0), load(1), load(2), load(3), load(4), load(5)]
+    }
+
+    /// Component `i` of sum F_l x_l over the legs.
+    #[inline(always)]
+    fn couple<S: Simd>(&self, simd: S, i: usize, x: &[Lanes<S>; 3]) -> f64 {
+        let [f1, f2, f3] = &self.coupling;
+        let load = |x: Quad| Lanes::load(simd, x);
+        (load(f1[i]) * x[0] + load(f2[i]) * x[1] + load(f3[i]) * x[2]).sum()
     }
 
     /// Accelerations of the joints for an acceleration `trunk`: `free` - G a_0.
-    #[inline]
-    fn follow(&self, free: &[Lanes; 3], trunk: &Six) -> [Lanes; 3] {
+    #[inline(always)]
+    fn follow<S: Simd>(&self, simd: S, free: &[Lanes<S>; 3], trunk: &Six) -> [Lanes<S>; 3] {
         let mut joint = *free;
         for (k, t) in trunk.iter().enumerate() {
-            let t = Lanes::splat(*t);
+            let t = Lanes::splat(simd, *t);
             for (joint, gain) in joint.iter_mut().zip(&self.gain) {
-                *joint -= gain[k] * t;
+                *joint -= Lanes::load(simd, gain[k]) * t;
             }
         }
         joint
     }
 }
 
+/// Returns the momentum `f` in hip axes as a column of F.
+#[inline(always)]
+fn column<S: Simd>(
+    f: SpatialForce<Lanes<S>>,
+    hip: AxisRotation<Lanes<S>>,
+    origin_hip: &Vector3<Lanes<S>>,
+) -> [Lanes<S>; 6] {
+    let SpatialForce { linear, angular } = f.in_parent(hip, origin_hip);
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
 /// Factors H + diag(`added`): C^-1 and G = H^-1 F^T.
-#[inline]
-fn factor(m: &[Lanes; 6], added: &[Lanes; 3], coupling: &[[Lanes; 6]; 3]) -> ([Lanes; 6], [[Lanes; 6]; 3]) {
+#[inline(always)]
+fn factor<S: Simd>(
+    m: &[Lanes<S>; 6],
+    added: &[Lanes<S>; 3],
+    coupling: &[[Lanes<S>; 6]; 3],
+) -> ([Lanes<S>; 6], [[Lanes<S>; 6]; 3]) {
     let [h11, h12, h13, h22, h23, h33] = *m;
-    let one = Lanes::splat(1.0);
+    let one = h11.splat(1.0);
     // H = C C^T, then C^-1 row by row.
-    let i11 = one / (h11 + added[0]).simd_sqrt();
+    let i11 = one / (h11 + added[0]).sqrt();
     let c21 = h12 * i11;
     let c31 = h13 * i11;
-    let i22 = one / (h22 + added[1] - c21 * c21).simd_sqrt();
+    let i22 = one / (h22 + added[1] - c21 * c21).sqrt();
     let c32 = (h23 - c31 * c21) * i22;
-    let i33 = one / (h33 + added[2] - c31 * c31 - c32 * c32).simd_sqrt();
+    let i33 = one / (h33 + added[2] - c31 * c31 - c32 * c32).sqrt();
     let i21 = -c21 * i11 * i22;
     let i32 = -c32 * i22 * i33;
     let i31 = -(c31 * i11 + c32 * i21) * i33;
     // G = C^-T (C^-1 F^T)
     let [f1, f2, f3] = coupling;
-    let mut gain = [[Lanes::splat(0.0); 6]; 3];
+    let mut gain = *coupling;
     for k in 0..6 {
         let y1 = i11 * f1[k];
         let y2 = i21 * f1[k] + i22 * f2[k];
@@ -238,61 +290,97 @@ impl LegDynamics {
 }
 
 impl Dynamics {
+    /// Memory for the equations of `model`; [`Dynamics::update`] computes them.
+    pub fn of(model: &RobotModel) -> Dynamics {
+        let rotation = AxisRotation { cos: Quad::ZERO, sin: Quad::ZERO };
+        let legs = LegLanes {
+            hip: rotation,
+            thigh: rotation,
+            calf: rotation,
+            origin_body: [Vector3::new(Quad::ZERO, Quad::ZERO, Quad::ZERO); 3],
+            mass: [Quad::ZERO; 6],
+            coupling: [[Quad::ZERO; 6]; 3],
+            bias: [Quad::ZERO; 3],
+            factor_inverse: [Quad::ZERO; 6],
+            gain: [[Quad::ZERO; 6]; 3],
+        };
+        let factor = Cholesky6::IDENTITY;
+        Dynamics { legs, composite: model.trunk, bias: [0.0; 6], factor, instructions: model.instructions }
+    }
+
+    /// Returns the equations of `model` at `state`, as [`Dynamics::update`].
+    pub fn new(model: &RobotModel, state: &SimState, added: &Joints) -> Dynamics {
+        let mut dynamics = Dynamics::of(model);
+        dynamics.update(model, state, added);
+        dynamics
+    }
+
     /// Computes the equations of `model` at `state`, with `added` on the diagonal of the joints' mass matrix (kg m^2):
     /// rotor inertia, and the terms that the time step treats implicitly.
-    pub fn new(model: &RobotModel, state: &SimState, added: &Joints) -> Dynamics {
+    pub fn update(&mut self, model: &RobotModel, state: &SimState, added: &Joints) {
+        with_lanes!(self.instructions, simd => self.evaluate(simd, model, state, added));
+    }
+
+    #[inline(always)]
+    fn evaluate<S: Simd>(&mut self, simd: S, model: &RobotModel, state: &SimState, added: &Joints) {
         let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
         let gravity_body = state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
+        let splat = |v: &Vector3<f64>| v.map(|x| Lanes::splat(simd, x));
         let (legs, leg_inertia, leg_force) = LegLanes::new(
+            simd,
             &model.legs,
-            joint_lanes(&state.joint_position),
-            joint_lanes(&state.joint_velocity),
-            joint_lanes(added),
-            &SpatialMotion { linear: velocity.linear.map(Lanes::splat), angular: velocity.angular.map(Lanes::splat) },
-            &gravity_body.map(Lanes::splat),
+            joint_lanes(simd, &state.joint_position),
+            joint_lanes(simd, &state.joint_velocity),
+            joint_lanes(simd, added),
+            &SpatialMotion { linear: splat(&velocity.linear), angular: splat(&velocity.angular) },
+            &splat(&gravity_body),
         );
 
         // f_0 = I_0 a_0 + v_0 x* I_0 v_0 of the trunk alone, plus the forces of the legs.
         let up = SpatialMotion { linear: -gravity_body, angular: Vector3::zeros() };
         let own = model.trunk.force(&velocity, &up);
+        let sums = |v: &Vector3<Lanes<S>>| v.map(Lanes::sum);
         let bias = own.plus(&SpatialForce { linear: sums(&leg_force.linear), angular: sums(&leg_force.angular) });
-        let composite = model.trunk.plus(&SpatialInertia {
-            mass: sum(leg_inertia.mass),
-            first: sums(&leg_inertia.first),
-            second: leg_inertia.second.map(sum),
-        });
+        let composite = model.trunk.plus(&leg_inertia.map(Lanes::sum));
 
         // I_A = I_0 - sum F G; only the lower triangle is used.
         let mut articulated = columns(&composite);
         let ([f1, f2, f3], [g1, g2, g3]) = (&legs.coupling, &legs.gain);
         for j in 0..6 {
             for i in j..6 {
-                articulated[j][i] -= sum(f1[i] * g1[j] + f2[i] * g2[j] + f3[i] * g3[j]);
+                articulated[j][i] -= (f1[i] * g1[j] + f2[i] * g2[j] + f3[i] * g3[j]).sum();
             }
         }
-        let factor = Cholesky6::new(articulated);
-        let (f, n) = (&bias.linear, &bias.angular);
-        Dynamics { legs, composite, bias: [f.x, f.y, f.z, n.x, n.y, n.z], factor }
+        legs.store(&mut self.legs);
+        self.composite = composite;
+        self.bias = stack(&bias.linear, &bias.angular);
+        self.factor = Cholesky6::new(articulated);
     }
 
     /// a = M^-1 ([0; tau] - b).
     pub fn acceleration(&self, torque: &Joints) -> Acceleration {
-        // z_l = H_l^-1 (tau_l - c_l);  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
-        let ([t1, t2, t3], [c1, c2, c3]) = (joint_lanes(torque), self.legs.bias);
-        let free = self.legs.solve(&[t1 - c1, t2 - c2, t3 - c3]);
-        let [f1, f2, f3] = &self.legs.coupling;
+        with_lanes!(self.instructions, simd => self.accelerate(simd, torque))
+    }
+
+    #[inline(always)]
+    fn accelerate<S: Simd>(&self, simd: S, torque: &Joints) -> Acceleration {
+        // z_l = H_l^-1 (tau_l - c_l) with H_l^-1 = C^-T C^-1;  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
+        let [t1, t2, t3] = joint_lanes(simd, torque);
+        let bias = |i: usize| Lanes::load(simd, self.legs.bias[i]);
+        let (u1, u2, u3) = (t1 - bias(0), t2 - bias(1), t3 - bias(2));
+        let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse(simd);
+        let (y1, y2, y3) = (i11 * u1, i21 * u1 + i22 * u2, i31 * u1 + i32 * u2 + i33 * u3);
+        let free = [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3];
         let mut trunk = self.bias;
         for (i, trunk) in trunk.iter_mut().enumerate() {
-            *trunk = -*trunk - sum(f1[i] * free[0] + f2[i] * free[1] + f3[i] * free[2]);
+            *trunk = -*trunk - self.legs.couple(simd, i, &free);
         }
         self.factor.solve_lower(&mut trunk);
         self.factor.solve_upper(&mut trunk);
-        let [hip, thigh, calf] = self.legs.follow(&free, &trunk);
-        let joint: [[f64; LEGS]; 3] = [hip.into(), thigh.into(), calf.into()];
         Acceleration {
             linear_body: Vector3::new(trunk[0], trunk[1], trunk[2]),
             angular_body: Vector3::new(trunk[3], trunk[4], trunk[5]),
-            joint: std::array::from_fn(|i| joint[i % 3][i / 3]),
+            joint: joints(self.legs.follow(simd, &free, &trunk)),
         }
     }
 
@@ -313,21 +401,27 @@ impl Dynamics {
 
     /// sum F_l dq_l: momentum due to the joints alone.
     fn joint_momentum(&self, joint_velocity: &Joints) -> SpatialForce<f64> {
-        let dq = joint_lanes(joint_velocity);
-        let [f1, f2, f3] = &self.legs.coupling;
-        let row = |i: usize| sum(f1[i] * dq[0] + f2[i] * dq[1] + f3[i] * dq[2]);
-        SpatialForce { linear: Vector3::new(row(0), row(1), row(2)), angular: Vector3::new(row(3), row(4), row(5)) }
+        let mut momentum = [0.0; 6];
+        with_lanes!(self.instructions, simd => {
+            let dq = joint_lanes(simd, joint_velocity);
+            for (i, momentum) in momentum.iter_mut().enumerate() {
+                *momentum = self.legs.couple(simd, i, &dq);
+            }
+        });
+        let (linear, angular) = split(&momentum);
+        SpatialForce { linear, angular }
     }
 
     /// Change of the joint velocities by impulses: C_l^-T y_l - G_l dv_0, with y_l = sum U^T p.
     pub fn joint_change(&self, sums: &PerLeg<Vector3<f64>>, trunk: &Six) -> PerLeg<Vector3<f64>> {
-        let lanes = |i: usize| Lanes::from([sums[0][i], sums[1][i], sums[2][i], sums[3][i]]);
-        let y = [lanes(0), lanes(1), lanes(2)];
-        let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse;
-        let own = [i11 * y[0] + i21 * y[1] + i31 * y[2], i22 * y[1] + i32 * y[2], i33 * y[2]];
-        let [hip, thigh, calf] = self.legs.follow(&own, trunk);
-        let [hip, thigh, calf]: [[f64; LEGS]; 3] = [hip.into(), thigh.into(), calf.into()];
-        std::array::from_fn(|l| Vector3::new(hip[l], thigh[l], calf[l]))
+        let change = with_lanes!(self.instructions, simd => {
+            let y = |i: usize| Lanes::new(simd, [sums[0][i], sums[1][i], sums[2][i], sums[3][i]]);
+            let (y1, y2, y3) = (y(0), y(1), y(2));
+            let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse(simd);
+            let own = [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3];
+            joints(self.legs.follow(simd, &own, trunk))
+        });
+        std::array::from_fn(|l| leg_of(&change, l))
     }
 
     /// The legs one by one.
@@ -342,9 +436,8 @@ impl Dynamics {
             gain: [[0.0; 6]; 3],
         }; LEGS];
         // Each quantity is distributed from its lanes to the four legs.
-        let mut scatter = |x: Lanes, element: fn(&mut LegDynamics, usize, usize) -> &mut f64, i: usize, j: usize| {
-            let x: [f64; LEGS] = x.into();
-            for (leg, x) in out.iter_mut().zip(x) {
+        let mut scatter = |x: Quad, element: fn(&mut LegDynamics, usize, usize) -> &mut f64, i: usize, j: usize| {
+            for (leg, x) in out.iter_mut().zip(x.0) {
                 *element(leg, i, j) = x;
             }
         };
@@ -371,33 +464,19 @@ impl Dynamics {
 
     /// F of one leg: a column for each joint.
     pub fn coupling(&self, leg: usize) -> [Six; 3] {
-        self.legs.coupling.map(|column| column.map(|x| x.extract(leg)))
+        self.legs.coupling.map(|column| column.map(|x| x.0[leg]))
     }
 
     /// H of one leg, without the terms added to its diagonal.
     pub fn leg_mass(&self, leg: usize) -> Matrix3<f64> {
-        let [h11, h12, h13, h22, h23, h33] = self.legs.mass.map(|x| x.extract(leg));
+        let [h11, h12, h13, h22, h23, h33] = self.legs.mass.map(|x| x.0[leg]);
         Matrix3::new(h11, h12, h13, h12, h22, h23, h13, h23, h33)
     }
 
     /// b of the joints' rows.
     pub fn joint_bias(&self) -> Joints {
-        let bias: [Lanes; 3] = self.legs.bias;
-        std::array::from_fn::<f64, JOINTS, _>(|i| bias[i % 3].extract(i / 3))
+        std::array::from_fn(|i| self.legs.bias[i % 3].0[i / 3])
     }
-}
-
-/// Sum over the legs.
-#[inline]
-fn sum(x: Lanes) -> f64 {
-    let [a, b, c, d]: [f64; LEGS] = x.into();
-    (a + b) + (c + d)
-}
-
-/// Sum over the legs of each component.
-#[inline]
-fn sums(v: &Vector3<Lanes>) -> Vector3<f64> {
-    Vector3::new(sum(v.x), sum(v.y), sum(v.z))
 }
 
 /// Returns a spatial inertia as the columns of a 6x6 matrix, linear part first: [[m 1, -hx], [hx, I]].

@@ -25,8 +25,6 @@ use crate::robot::{GRAVITY, JOINTS, Joints};
 /// Values that a flight step leaves for the next one.
 #[derive(Debug, Clone)]
 pub(super) struct FlightMemory {
-    /// Equations at the end of the step, with the predicted velocities.
-    pub dynamics: Dynamics,
     /// Accelerations at the start and at the end of the step under its torques.
     start: Acceleration,
     end: Acceleration,
@@ -34,12 +32,14 @@ pub(super) struct FlightMemory {
     h: f64,
 }
 
-/// Advances `state` by `h` seconds of flight under constant torques. `dynamics` holds the equations at its start, `start` the
-/// acceleration there, `before` the memory of the flight step that ended there.
+/// Advances `state` by `h` seconds of flight under constant torques. `dynamics` holds the equations at its start, and afterwards those at
+/// its end with the predicted velocities; `start` is the acceleration at its start, `before` the memory of the flight step that ended
+/// there.
 pub(super) fn flight_step(
     model: &RobotModel,
+    dynamics: &mut Dynamics,
     state: &mut SimState,
-    (dynamics, start): (&Dynamics, &Acceleration),
+    start: &Acceleration,
     before: Option<&FlightMemory>,
     torque: &Joints,
     h: f64,
@@ -67,8 +67,11 @@ pub(super) fn flight_step(
             state.joint_velocity[i] + h * start.joint[i] + 0.5 * h * growth.joint[i]
         }),
     };
-    let next = Dynamics::new(model, &predicted, &model.rotor_inertia);
-    let end = next.acceleration(torque);
+    let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
+    let momentum = dynamics.momentum(&velocity, &state.joint_velocity);
+    let com_body = dynamics.com_body();
+    dynamics.update(model, &predicted, &model.rotor_inertia);
+    let end = dynamics.acceleration(torque);
 
     // v + h (5 a' + 8 a - a_before) / 12 with a_before = a - h da/dt; without a step before, v + h (a + a') / 2.
     let joint_velocity = match before {
@@ -80,17 +83,15 @@ pub(super) fn flight_step(
     };
 
     // Momentum and centre of mass, world.
-    let velocity = SpatialMotion { linear: state.velocity_body, angular: state.angular_velocity_body };
-    let momentum = dynamics.momentum(&velocity, &state.joint_velocity);
     let mass = model.mass();
-    let (com_body, next_com_body) = (dynamics.com_body(), next.com_body());
+    let next_com_body = dynamics.com_body();
     let linear_world = state.world_from_body * momentum.linear;
     let angular_world = state.world_from_body * (momentum.angular - com_body.cross(&momentum.linear));
     let fall = Vector3::new(0.0, 0.0, -GRAVITY * h);
     let com_world = state.position_world + state.world_from_body * com_body + (linear_world / mass + fall * 0.5) * h;
     let linear = world_from_body.inverse_transform_vector(&(linear_world + fall * mass));
     let angular = world_from_body.inverse_transform_vector(&angular_world) + next_com_body.cross(&linear);
-    let velocity = next.trunk_velocity(&SpatialForce { linear, angular }, &joint_velocity);
+    let velocity = dynamics.trunk_velocity(&SpatialForce { linear, angular }, &joint_velocity);
 
     *state = SimState {
         position_world: com_world - world_from_body * next_com_body,
@@ -99,5 +100,5 @@ pub(super) fn flight_step(
         joint_velocity,
         ..predicted
     };
-    FlightMemory { dynamics: next, start: *start, end, h }
+    FlightMemory { start: *start, end, h }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::motion::GeneralizedVelocity;
-use super::quantities::{split, stack};
+use super::six::{split, stack};
 use super::state::{Acceleration, SimState};
 use crate::robot::JOINTS;
 

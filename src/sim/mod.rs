@@ -15,6 +15,7 @@ pub mod ensemble;
 mod flight;
 mod integrate;
 mod joint_stop;
+mod lanes;
 mod model;
 mod motion;
 mod quantities;
@@ -63,7 +64,9 @@ pub struct Simulator {
     actuator: Actuator,
     solver: ContactSolver,
     state: SimState,
-    /// Present if the last step was one of free flight.
+    /// Equations of the step.
+    dynamics: Dynamics,
+    /// Present if the last step was one of free flight; the equations are those of the present state then.
     flight: Option<FlightMemory>,
     contacts: PeriodContacts,
     /// Mean acceleration of the inertial unit over the last period, less gravity; body axes, m/s^2.
@@ -92,6 +95,7 @@ impl Simulator {
             solver: ContactSolver::new(config.solver, &config.contact, collider.warm_start_slots()),
             terrain: Terrain::new(&config.terrain),
             actuator: Actuator::new(motor, &description.limits),
+            dynamics: Dynamics::of(&model),
             model,
             limits: description.limits,
             imu_origin: description.imu_origin,
@@ -107,6 +111,14 @@ impl Simulator {
         };
         simulator.set_state(&SimState::default());
         Ok(simulator)
+    }
+
+    /// Computes as [`RobotModel::with_baseline_instructions`].
+    pub fn with_baseline_instructions(mut self) -> Simulator {
+        self.model = self.model.with_baseline_instructions();
+        self.dynamics = Dynamics::of(&self.model);
+        self.flight = None;
+        self
     }
 
     /// The constant model.

@@ -1,21 +1,20 @@
 //! The constant model: the robot description in the form that the equations use.
 
+use fearless_simd::Level;
 use nalgebra::Vector3;
 
+use super::lanes::Quad;
 use super::spatial::{SpatialInertia, SymmetricMatrix};
 use crate::robot::description::{RigidBody, RobotDescription};
 use crate::robot::{JOINTS, Joints, PerLeg};
-
-/// One number per leg, in SIMD lanes.
-pub(super) type Lanes = simba::simd::WideF64x4;
 
 /// Constants of the legs.
 #[derive(Debug, Clone)]
 pub(super) struct LegsModel {
     /// Origin of each joint in its parent's frame, m.
-    pub joint_origin: [Vector3<Lanes>; 3],
+    pub joint_origin: [Vector3<Quad>; 3],
     /// Inertia of hip, thigh and calf about their joint's origin, link axes.
-    pub inertia: [SpatialInertia<Lanes>; 3],
+    pub inertia: [SpatialInertia<Quad>; 3],
 }
 
 /// Masses and geometry of the robot.
@@ -28,6 +27,8 @@ pub struct RobotModel {
     mass: f64,
     /// Inertia of the rotors at each joint, kg m^2; zero for ideal motors.
     pub(super) rotor_inertia: Joints,
+    /// Instructions with which the equations are evaluated.
+    pub(super) instructions: Level,
 }
 
 impl RobotModel {
@@ -46,12 +47,20 @@ impl RobotModel {
             },
             foot_origin: legs.each_ref().map(|leg| leg.foot_origin),
             rotor_inertia: [0.0; JOINTS],
+            instructions: Level::new(),
         }
     }
 
     /// Sets the inertia of the rotors at the joints, kg m^2.
     pub fn with_rotor_inertia(mut self, rotor_inertia: Joints) -> RobotModel {
         self.rotor_inertia = rotor_inertia;
+        self
+    }
+
+    /// Evaluates the equations with the instructions that every processor of this architecture has, in place of the widest ones of this
+    /// processor: slower, with the same bits.
+    pub fn with_baseline_instructions(mut self) -> RobotModel {
+        self.instructions = Level::baseline();
         self
     }
 
@@ -62,14 +71,14 @@ impl RobotModel {
 }
 
 /// Returns one vector per leg as a vector of lanes.
-pub(super) fn vector_lanes(v: &PerLeg<Vector3<f64>>) -> Vector3<Lanes> {
-    Vector3::new(Lanes::from(v.map(|v| v.x)), Lanes::from(v.map(|v| v.y)), Lanes::from(v.map(|v| v.z)))
+fn vector_lanes(v: &PerLeg<Vector3<f64>>) -> Vector3<Quad> {
+    Vector3::from_fn(|i, _| Quad(v.map(|v| v[i])))
 }
 
-fn inertia_lanes(i: &PerLeg<SpatialInertia<f64>>) -> SpatialInertia<Lanes> {
-    let lanes = |f: fn(&SymmetricMatrix<f64>) -> f64| Lanes::from(i.each_ref().map(|i| f(&i.second)));
+fn inertia_lanes(i: &PerLeg<SpatialInertia<f64>>) -> SpatialInertia<Quad> {
+    let lanes = |f: fn(&SymmetricMatrix<f64>) -> f64| Quad(i.each_ref().map(|i| f(&i.second)));
     SpatialInertia {
-        mass: Lanes::from(i.map(|i| i.mass)),
+        mass: Quad(i.map(|i| i.mass)),
         first: vector_lanes(&i.map(|i| i.first)),
         second: SymmetricMatrix {
             xx: lanes(|s| s.xx),

@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::dynamics::{Dynamics, LegDynamics};
-use super::quantities::stack;
-use super::six::Six;
+use super::six::{Six, stack};
 use super::state::SimState;
 use super::terrain::Terrain;
 use crate::robot::{LEGS, PerLeg, leg_of};

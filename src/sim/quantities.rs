@@ -8,7 +8,6 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::dynamics::{Dynamics, columns};
 use super::model::RobotModel;
-use super::six::Six;
 use super::spatial::{SpatialForce, SpatialMotion};
 use super::state::{Acceleration, SimState};
 use crate::robot::{GRAVITY, JOINTS, Joints, LEGS, PerLeg, leg_of};
@@ -146,16 +145,4 @@ impl RobotModel {
             }
         })
     }
-}
-
-/// Joins linear and angular part.
-#[inline]
-pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
-    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
-}
-
-/// Returns linear and angular part.
-#[inline]
-pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
-    (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))
 }

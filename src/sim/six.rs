@@ -1,16 +1,30 @@
 //! Vectors and symmetric matrices of six: velocities of the trunk, the rows of a leg.
 
+use nalgebra::Vector3;
+
 /// A six-vector. A plain array, which the compiler vectorizes.
 pub(super) type Six = [f64; 6];
 
-/// a . b
+/// Joins linear and angular part.
 #[inline]
+pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
+    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+}
+
+/// Returns linear and angular part.
+#[inline]
+pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))
+}
+
+/// a . b
+#[inline(always)]
 pub(super) fn dot(a: &Six, b: &Six) -> f64 {
     (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
 }
 
 /// y += s x
-#[inline]
+#[inline(always)]
 pub(super) fn add_scaled(y: &mut Six, x: &Six, s: f64) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += s * x;
@@ -40,7 +54,7 @@ impl Cholesky6 {
     };
 
     /// Factors a matrix of which only the lower triangle, by columns, is used.
-    #[inline]
+    #[inline(always)]
     pub fn new(mut a: [Six; 6]) -> Cholesky6 {
         let mut diagonal_inverse = [0.0; 6];
         for j in 0..6 {
@@ -59,7 +73,7 @@ impl Cholesky6 {
     }
 
     /// Replaces x by L^-1 x.
-    #[inline]
+    #[inline(always)]
     pub fn solve_lower(&self, x: &mut Six) {
         for j in 0..6 {
             x[j] *= self.diagonal_inverse[j];
@@ -70,7 +84,7 @@ impl Cholesky6 {
     }
 
     /// Replaces x by L^-T x.
-    #[inline]
+    #[inline(always)]
     pub fn solve_upper(&self, x: &mut Six) {
         for j in (0..6).rev() {
             for i in j + 1..6 {

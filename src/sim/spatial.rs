@@ -3,12 +3,30 @@
 //!
 //! `T` is one number, or one SIMD lane per leg.
 
-use nalgebra::{Matrix3, Vector3};
-use simba::simd::SimdRealField;
+use std::ops::Neg;
+
+use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Matrix3, Scalar, Vector3};
 
 /// One number, or one per lane.
-pub(super) trait Real: SimdRealField + Copy {}
-impl<T: SimdRealField + Copy> Real for T {}
+pub(super) trait Real:
+    Scalar + Copy + ClosedAddAssign + ClosedSubAssign + ClosedMulAssign + ClosedDivAssign + Neg<Output = Self>
+{
+    /// The number `x`, in every lane of `self`.
+    fn splat(self, x: f64) -> Self;
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn splat(self, x: f64) -> f64 {
+        x
+    }
+}
+
+/// a x b. (nalgebra's is not inlined for lanes.)
+#[inline(always)]
+pub(super) fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
 
 /// Rotation about one coordinate axis, as cosine and sine.
 #[derive(Debug, Clone, Copy)]
@@ -17,33 +35,35 @@ pub(super) struct AxisRotation<T> {
     pub sin: T,
 }
 
-impl<T: Real> AxisRotation<T> {
-    #[inline]
-    pub fn new(angle: T) -> AxisRotation<T> {
-        let (sin, cos) = angle.simd_sin_cos();
-        AxisRotation { cos, sin }
+impl<T: Scalar + Copy> AxisRotation<T> {
+    /// Applies `f` to cosine and sine.
+    #[inline(always)]
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> AxisRotation<U> {
+        AxisRotation { cos: f(self.cos), sin: f(self.sin) }
     }
+}
 
+impl<T: Real> AxisRotation<T> {
     /// Rx v: from the rotated frame to the original one.
-    #[inline]
+    #[inline(always)]
     pub fn rotate_x(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(v.x, self.cos * v.y - self.sin * v.z, self.sin * v.y + self.cos * v.z)
     }
 
     /// Rx^T v.
-    #[inline]
+    #[inline(always)]
     pub fn unrotate_x(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(v.x, self.cos * v.y + self.sin * v.z, self.cos * v.z - self.sin * v.y)
     }
 
     /// Ry v.
-    #[inline]
+    #[inline(always)]
     pub fn rotate_y(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(self.cos * v.x + self.sin * v.z, v.y, self.cos * v.z - self.sin * v.x)
     }
 
     /// Ry^T v.
-    #[inline]
+    #[inline(always)]
     pub fn unrotate_y(self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(self.cos * v.x - self.sin * v.z, v.y, self.sin * v.x + self.cos * v.z)
     }
@@ -62,7 +82,7 @@ pub(super) struct SymmetricMatrix<T> {
 
 impl<T: Copy> SymmetricMatrix<T> {
     /// Applies `f` to each element.
-    #[inline]
+    #[inline(always)]
     pub fn map<U>(&self, f: impl Fn(T) -> U) -> SymmetricMatrix<U> {
         let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = *self;
         SymmetricMatrix { xx: f(xx), xy: f(xy), xz: f(xz), yy: f(yy), yz: f(yz), zz: f(zz) }
@@ -70,7 +90,7 @@ impl<T: Copy> SymmetricMatrix<T> {
 }
 
 impl<T: Real> SymmetricMatrix<T> {
-    #[inline]
+    #[inline(always)]
     fn plus(&self, o: &SymmetricMatrix<T>) -> SymmetricMatrix<T> {
         SymmetricMatrix {
             xx: self.xx + o.xx,
@@ -82,7 +102,7 @@ impl<T: Real> SymmetricMatrix<T> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn times(&self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(
             self.xx * v.x + self.xy * v.y + self.xz * v.z,
@@ -92,7 +112,7 @@ impl<T: Real> SymmetricMatrix<T> {
     }
 
     /// A^-1 v of a positive matrix, by cofactors.
-    #[inline]
+    #[inline(always)]
     fn inverse_times(&self, v: &Vector3<T>) -> Vector3<T> {
         let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = *self;
         let cofactors = SymmetricMatrix {
@@ -128,14 +148,22 @@ impl SpatialInertia<f64> {
     }
 }
 
+impl<T: Scalar + Copy> SpatialInertia<T> {
+    /// Applies `f` to each element.
+    #[inline(always)]
+    pub fn map<U: Scalar>(&self, f: impl Fn(T) -> U + Copy) -> SpatialInertia<U> {
+        SpatialInertia { mass: f(self.mass), first: self.first.map(f), second: self.second.map(f) }
+    }
+}
+
 impl<T: Real> SpatialInertia<T> {
-    #[inline]
+    #[inline(always)]
     pub fn plus(&self, o: &SpatialInertia<T>) -> SpatialInertia<T> {
         SpatialInertia { mass: self.mass + o.mass, first: self.first + o.first, second: self.second.plus(&o.second) }
     }
 
     /// The inertia about a new origin; `r` is the old origin in the new frame.
-    #[inline]
+    #[inline(always)]
     pub fn moved(&self, r: &Vector3<T>) -> SpatialInertia<T> {
         // h' = h + m r;  I' = I + 2 (h.r) 1 - h r^T - r h^T + m (r.r 1 - r r^T) = I + ((h + h').r) 1 - h' r^T - r h^T
         let h = &self.first;
@@ -157,7 +185,7 @@ impl<T: Real> SpatialInertia<T> {
     }
 
     /// Ry I Ry^T.
-    #[inline]
+    #[inline(always)]
     pub fn rotated_y(&self, t: AxisRotation<T>) -> SpatialInertia<T> {
         let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = self.second;
         let (cc, ss, cs) = (t.cos * t.cos, t.sin * t.sin, t.cos * t.sin);
@@ -177,7 +205,7 @@ impl<T: Real> SpatialInertia<T> {
     }
 
     /// Rx I Rx^T.
-    #[inline]
+    #[inline(always)]
     pub fn rotated_x(&self, t: AxisRotation<T>) -> SpatialInertia<T> {
         let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = self.second;
         let (cc, ss, cs) = (t.cos * t.cos, t.sin * t.sin, t.cos * t.sin);
@@ -197,29 +225,29 @@ impl<T: Real> SpatialInertia<T> {
     }
 
     /// I v (eq. 2.63): momentum at the velocity `v`, or force for the acceleration `v`.
-    #[inline]
+    #[inline(always)]
     pub fn times(&self, v: &SpatialMotion<T>) -> SpatialForce<T> {
         SpatialForce {
-            linear: v.linear * self.mass - self.first.cross(&v.angular),
-            angular: self.second.times(&v.angular) + self.first.cross(&v.linear),
+            linear: v.linear * self.mass - cross(&self.first, &v.angular),
+            angular: self.second.times(&v.angular) + cross(&self.first, &v.linear),
         }
     }
 
     /// I a + v x* I v (eq. 5.9): force for the acceleration `a` at the velocity `v`.
-    #[inline]
+    #[inline(always)]
     pub fn force(&self, v: &SpatialMotion<T>, a: &SpatialMotion<T>) -> SpatialForce<T> {
         // With the acceleration of the body's point at the origin a_O = a + w x v:
         //   f = m a_O + w' x h + w x (w x h),  n = I w' + h x a_O + w x I w.
         let (h, w) = (&self.first, &v.angular);
-        let at_origin = a.linear + w.cross(&v.linear);
+        let at_origin = a.linear + cross(w, &v.linear);
         SpatialForce {
-            linear: at_origin * self.mass + a.angular.cross(h) + w.cross(&w.cross(h)),
-            angular: self.second.times(&a.angular) + h.cross(&at_origin) + w.cross(&self.second.times(w)),
+            linear: at_origin * self.mass + cross(&a.angular, h) + cross(w, &cross(w, h)),
+            angular: self.second.times(&a.angular) + cross(h, &at_origin) + cross(w, &self.second.times(w)),
         }
     }
 
     /// Returns the velocity at which the momentum is `momentum`: I^-1 f.
-    #[inline]
+    #[inline(always)]
     pub fn velocity(&self, momentum: &SpatialForce<T>) -> SpatialMotion<T> {
         // With c = h / m:  v = f / m + c x w,  (I + h x c x) w = n - c x f.
         let center = self.first / self.mass;
@@ -232,23 +260,23 @@ impl<T: Real> SpatialInertia<T> {
             yz: i.yz + c.y * h.z,
             zz: i.zz - (c.x * h.x + c.y * h.y),
         };
-        let angular = about_com.inverse_times(&(momentum.angular - center.cross(&momentum.linear)));
-        SpatialMotion { linear: momentum.linear / self.mass + center.cross(&angular), angular }
+        let angular = about_com.inverse_times(&(momentum.angular - cross(&center, &momentum.linear)));
+        SpatialMotion { linear: momentum.linear / self.mass + cross(&center, &angular), angular }
     }
 
     /// I s for the joint s = [x; 0] about x through the origin.
-    #[inline]
+    #[inline(always)]
     pub fn times_x(&self) -> SpatialForce<T> {
         let (h, i) = (&self.first, &self.second);
-        SpatialForce { linear: Vector3::new(T::zero(), -h.z, h.y), angular: Vector3::new(i.xx, i.xy, i.xz) }
+        SpatialForce { linear: Vector3::new(self.mass.splat(0.0), -h.z, h.y), angular: Vector3::new(i.xx, i.xy, i.xz) }
     }
 
     /// I s for the joint s = [y; o x y] about y through `o`.
-    #[inline]
+    #[inline(always)]
     pub fn times_y(&self, o: &Vector3<T>) -> SpatialForce<T> {
         let (m, h, i) = (self.mass, &self.first, &self.second);
         SpatialForce {
-            linear: Vector3::new(h.z - m * o.z, T::zero(), m * o.x - h.x),
+            linear: Vector3::new(h.z - m * o.z, m.splat(0.0), m * o.x - h.x),
             angular: Vector3::new(i.xy + h.y * o.x, i.yy - h.z * o.z - h.x * o.x, i.yz + h.y * o.z),
         }
     }
@@ -274,18 +302,18 @@ pub(super) struct SpatialForce<T> {
 
 impl<T: Real> SpatialMotion<T> {
     /// v + s w for the joint about x through the origin, and v x s w (eq. 2.33) at that velocity.
-    #[inline]
+    #[inline(always)]
     pub fn across_joint_x(&self, w: T) -> (SpatialMotion<T>, SpatialMotion<T>) {
         let mut v = *self;
         v.angular.x += w;
-        let (l, a, o) = (&v.linear, &v.angular, T::zero());
+        let (l, a, o) = (&v.linear, &v.angular, w.splat(0.0));
         let change =
             SpatialMotion { linear: Vector3::new(o, l.z * w, -l.y * w), angular: Vector3::new(o, a.z * w, -a.y * w) };
         (v, change)
     }
 
     /// v + s w for the joint about y through `o`, and v x s w at that velocity.
-    #[inline]
+    #[inline(always)]
     pub fn across_joint_y(&self, w: T, o: &Vector3<T>) -> (SpatialMotion<T>, SpatialMotion<T>) {
         // s w = [y w; (-o_z, 0, o_x) w]
         let (lx, lz) = (-o.z * w, o.x * w);
@@ -295,36 +323,36 @@ impl<T: Real> SpatialMotion<T> {
         v.linear.z += lz;
         let (l, a) = (&v.linear, &v.angular);
         let linear = Vector3::new(a.y * lz - l.z * w, a.z * lx - a.x * lz, l.x * w - a.y * lx);
-        (v, SpatialMotion { linear, angular: Vector3::new(-a.z * w, T::zero(), a.x * w) })
+        (v, SpatialMotion { linear, angular: Vector3::new(-a.z * w, w.splat(0.0), a.x * w) })
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn plus(&self, o: &SpatialMotion<T>) -> SpatialMotion<T> {
         SpatialMotion { linear: self.linear + o.linear, angular: self.angular + o.angular }
     }
 }
 
 impl<T: Real> SpatialForce<T> {
-    #[inline]
+    #[inline(always)]
     pub fn plus(&self, o: &SpatialForce<T>) -> SpatialForce<T> {
         SpatialForce { linear: self.linear + o.linear, angular: self.angular + o.angular }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn minus(&self, o: &SpatialForce<T>) -> SpatialForce<T> {
         SpatialForce { linear: self.linear - o.linear, angular: self.angular - o.angular }
     }
 
     /// s . f for the joint about y through `o`: the joint's torque.
-    #[inline]
+    #[inline(always)]
     pub fn about_y(&self, o: &Vector3<T>) -> T {
         self.angular.y + o.x * self.linear.z - o.z * self.linear.x
     }
 
     /// Transforms the force to the parent frame, in which this one is rotated by `t` about x and displaced by `r`.
-    #[inline]
+    #[inline(always)]
     pub fn in_parent(&self, t: AxisRotation<T>, r: &Vector3<T>) -> SpatialForce<T> {
         let linear = t.rotate_x(&self.linear);
-        SpatialForce { linear, angular: t.rotate_x(&self.angular) + r.cross(&linear) }
+        SpatialForce { linear, angular: t.rotate_x(&self.angular) + cross(r, &linear) }
     }
 }

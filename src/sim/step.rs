@@ -4,7 +4,6 @@ use nalgebra::Matrix3;
 
 use super::Simulator;
 use super::collision::Collider;
-use super::dynamics::Dynamics;
 use super::flight::flight_step;
 use super::integrate::{free_velocity, semi_implicit_euler};
 use super::joint_stop::add_joint_constraints;
@@ -47,22 +46,18 @@ impl Simulator {
             return false;
         }
         let last = self.flight.take();
-        let evaluated;
-        let dynamics = match &last {
-            Some(last) => &last.dynamics,
-            None => {
-                evaluated = Dynamics::new(&self.model, &self.state, &self.model.rotor_inertia);
-                &evaluated
-            }
-        };
-        let acceleration = dynamics.acceleration(&drive.torque);
-        self.find_contacts(dynamics, &free_velocity(&self.state, &acceleration, h), &drive.dry_friction, h);
+        if last.is_none() {
+            self.dynamics.update(&self.model, &self.state, &self.model.rotor_inertia);
+        }
+        let acceleration = self.dynamics.acceleration(&drive.torque);
+        self.find_contacts(&free_velocity(&self.state, &acceleration, h), &drive.dry_friction, h);
         if !self.solver.is_empty() {
             self.actuator = before;
             return false;
         }
-        let equations = (dynamics, &acceleration);
-        self.flight = Some(flight_step(&self.model, &mut self.state, equations, last.as_ref(), &drive.torque, h));
+        let dynamics = &mut self.dynamics;
+        self.flight =
+            Some(flight_step(&self.model, dynamics, &mut self.state, &acceleration, last.as_ref(), &drive.torque, h));
         self.terrain.advance(h);
         true
     }
@@ -73,12 +68,12 @@ impl Simulator {
         let drive = self.actuator.drive(command, &self.state.joint_position, &self.state.joint_velocity, h);
         // (M + h D) (v' - v) = h (tau - b): damping at the velocity of the end of the step.
         let added = std::array::from_fn(|i| self.model.rotor_inertia[i] + h * drive.damping[i]);
-        let dynamics = Dynamics::new(&self.model, &self.state, &added);
-        let acceleration = dynamics.acceleration(&drive.torque);
+        self.dynamics.update(&self.model, &self.state, &added);
+        let acceleration = self.dynamics.acceleration(&drive.torque);
         let mut velocity = free_velocity(&self.state, &acceleration, h);
-        let world_from_body = self.find_contacts(&dynamics, &velocity, &drive.dry_friction, h);
+        let world_from_body = self.find_contacts(&velocity, &drive.dry_friction, h);
         if !self.solver.is_empty() {
-            let change = self.solver.solve(&dynamics, &world_from_body);
+            let change = self.solver.solve(&self.dynamics, &world_from_body);
             add_scaled(&mut velocity.trunk, &change.trunk, 1.0);
             for (leg, change) in velocity.legs.iter_mut().zip(&change.legs) {
                 *leg += change;
@@ -93,14 +88,14 @@ impl Simulator {
     /// Fills the solver with the constraints of a step of `h` seconds; returns the rotation from body axes to world axes.
     fn find_contacts(
         &mut self,
-        dynamics: &Dynamics,
         free_velocity: &GeneralizedVelocity,
         dry_friction: &[f64; JOINTS],
         h: f64,
     ) -> Matrix3<f64> {
         self.solver.start(h);
         let world_from_body = self.state.world_from_body.to_rotation_matrix().into_inner();
-        let (state, terrain, legs) = (&self.state, &self.terrain, &dynamics.legs());
+        let (dynamics, state, terrain) = (&self.dynamics, &self.state, &self.terrain);
+        let legs = &dynamics.legs();
         let step = StepContext { dynamics, legs, state, terrain, world_from_body: &world_from_body, free_velocity, h };
         self.collider.find(&step, &mut self.solver);
         add_joint_constraints(&mut self.solver, &step, &self.limits, dry_friction);

@@ -4,7 +4,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{GRAVITY, JointCommand, Robot};
-use quadfrog::sim::{SimConfig, SimState, Simulator};
+use quadfrog::sim::{ActuatorKind, SimConfig, SimState, Simulator};
 
 /// A limp robot that tumbles high up, without joint stops.
 fn tumbling(flight_substeps: u32) -> Simulator {
@@ -109,4 +109,31 @@ fn a_run_repeats_bit_for_bit() {
     assert_eq!(first, run(&mut simulator.clone()));
     let in_thread = std::thread::spawn(move || run(&mut Simulator::new(&robot, &config).unwrap()));
     assert_eq!(first, in_thread.join().unwrap());
+}
+
+/// A robot that tumbles, falls on its legs and its trunk, and is moved by its motors, with dry friction and lag in its joints.
+#[test]
+fn the_widest_and_the_baseline_instructions_give_the_same_bits() {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let mut config = SimConfig::default();
+    config.actuator.kind = ActuatorKind::HardwareLike;
+    let mut wide = Simulator::new(&robot, &config).unwrap();
+    wide.set_state(&SimState { position_world: Vector3::new(0.0, 0.0, 1.5), ..*tumbling(1).state() });
+    let mut baseline = wide.clone().with_baseline_instructions();
+    let bits = |simulator: &Simulator| {
+        let SimState { position_world, world_from_body, joint_position, velocity_body, joint_velocity, .. } =
+            simulator.state();
+        let trunk = position_world.iter().chain(world_from_body.coords.iter()).chain(velocity_body.iter());
+        trunk.chain(joint_position).chain(joint_velocity).map(|x| x.to_bits()).collect::<Vec<_>>()
+    };
+    let mut touched = 0;
+    for tick in 0..2000 {
+        let torque = std::array::from_fn(|i| 15.0 * (f64::from(tick) * 0.03 + i as f64).sin());
+        for simulator in [&mut wide, &mut baseline] {
+            simulator.write(&JointCommand::torques(&torque)).unwrap();
+        }
+        assert_eq!(bits(&wide), bits(&baseline), "after {tick} ms");
+        touched += usize::from(wide.contact_count() > 0);
+    }
+    assert!(0 < touched && touched < 2000, "{touched} ms with contacts");
 }

@@ -10,8 +10,7 @@ use crate::robot::{JOINTS, Joints, LEGS};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::Dynamics;
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
-use crate::sim::quantities::stack;
-use crate::sim::six::{add_scaled, dot};
+use crate::sim::six::{add_scaled, dot, stack};
 use crate::sim::terrain::LooseBlock;
 
 /// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
