@@ -29,20 +29,24 @@ pub(super) struct Lanes<S: Simd>(f64x4<S>);
 /// Evaluates `$kernel` with the instructions of the [`Level`](fearless_simd::Level) `$level`, whose token is `$simd`. Functions that it
 /// calls are compiled for them if they are `#[inline(always)]`. On x86-64 that is AVX2 or SSE2: the levels between and above them gain
 /// less than their code costs.
+#[cfg(target_arch = "x86_64")]
 macro_rules! with_lanes {
     ($level:expr, $simd:ident => $kernel:expr) => {
-        'kernel: {
-            let _level: fearless_simd::Level = $level;
-            #[cfg(target_arch = "x86_64")]
-            if let Some($simd) = _level.as_avx2() {
-                break 'kernel fearless_simd::Simd::vectorize(
-                    $simd,
-                    #[inline(always)]
-                    || $kernel,
-                );
-            }
-            fearless_simd::dispatch!(fearless_simd::Level::baseline(), $simd => $kernel)
+        match fearless_simd::Level::as_avx2($level) {
+            Some($simd) => fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $kernel,
+            ),
+            None => fearless_simd::dispatch!(fearless_simd::Level::baseline(), $simd => $kernel),
         }
+    };
+}
+/// Evaluates `$kernel` with the instructions of `$level`, whose token is `$simd`.
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! with_lanes {
+    ($level:expr, $simd:ident => $kernel:expr) => {
+        fearless_simd::dispatch!($level, $simd => $kernel)
     };
 }
 pub(super) use with_lanes;
