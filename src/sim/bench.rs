@@ -1,10 +1,9 @@
 //! Speed of the simulator, for `benches/simulator.rs` and `quadfrog bench`.
 //!
 //! A step with four contacts and three sweeps takes 11,600 floating-point operations, a step of flight 7,600 (callgrind). On a core of an
-//! EPYC (2.6 GHz) that has AVX2 they take 1.38 us and 0.81 us: 8.4 and 9.4 Gflop/s, 40 % and 45 % of the 20.8 Gflop/s that two additions
+//! EPYC (2.6 GHz) that has AVX2 they take 1.27 us and 0.84 us: 9.1 and 9.0 Gflop/s, 44 % and 43 % of the 20.8 Gflop/s that two additions
 //! or multiplications of four lanes per cycle give. The rest is data movement between lanes and legs, and the contacts, which are computed
-//! one after the other. MuJoCo's standing step took 11.7 us there, 8.4 times as long (`quadfrog bench speed --mujoco`). On a processor
-//! with SSE2 alone (two lanes) ours take 1.4 times as long, with the same bits.
+//! one after the other. MuJoCo's standing step took 10.6 us there, 8.2 to 8.5 times as long (`quadfrog bench --mujoco FILE`).
 
 use std::time::Instant;
 
