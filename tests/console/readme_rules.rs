@@ -81,6 +81,24 @@ fn the_chart_of_a_fall_has_a_range_near_its_tilt() {
     }
 }
 
+/// Regression: the axis of the yaw went from -3.2 to 3.2 rad straight to 13 rad, where a turn of half a circle takes two rows.
+#[test]
+fn the_chart_of_a_turn_has_a_range_near_it() {
+    for (yaw_rad, most) in [(3.1, "4"), (-3.1, "0.5"), (5.9, "7")] {
+        let mut console = Console::ready();
+        for time_ms in (0..2_000).step_by(5) {
+            let mut turned = tick(time_ms, 0.0, None);
+            turned.estimate.roll_pitch_yaw.z = yaw_rad * time_ms as f64 / 2_000.0;
+            console.tick(turned);
+        }
+        while !console.screen(120, 40).contains("yaw") {
+            console.press(&["t"]);
+        }
+        let charts = console.screen(120, 40);
+        assert!(charts.lines().any(|line| line.trim_start().starts_with(&format!("{most} "))), "{yaw_rad}: {charts}");
+    }
+}
+
 /// Regression: a replay asked for a verdict.
 #[test]
 fn a_replay_asks_for_no_verdict_and_offers_no_stop() {

@@ -249,6 +249,17 @@ fn the_reasons_for_the_last_proposal_stay_when_the_study_is_finished() {
     assert_shows(&console.screen(120, 40), &["TPE f0 (#12)", "importance 62 %", "g good"]);
 }
 
+/// Regression: a finished study that was continued said "sampled without a model" of its last trial.
+#[test]
+fn a_continued_study_that_is_finished_has_no_reasons_of_a_proposal() {
+    let mut console = Console::ready();
+    console.record(Record::Insight(ProposalInsight { trial: 19, ..ProposalInsight::default() }));
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["no proposal in this session"]);
+    assert!(!screen.contains("without a model") && !screen.contains("(#19)"), "{screen}");
+}
+
 #[test]
 fn panels_of_one_parameter_have_the_same_axis_when_the_search_is_narrowed() {
     let mut console = Console::proposed();

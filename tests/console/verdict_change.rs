@@ -103,7 +103,7 @@ fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
     let arguments = ["--resume", study.to_str().expect("a name")];
     let mut session = Session::start(folder.path(), (120, 40), &arguments);
     session.wait_for(&["Trial #0: judge it", "0.400 m by hand", "Judge it: a accept (suggested)"]);
-    session.wait_for(&["trial 0 waits for its verdict since the last session"]);
+    session.wait_for(&["trial 0 had no verdict at the end of the last session"]);
     // Killed, it still waits.
     session.signal(nix::sys::signal::Signal::SIGKILL);
     session.wait();

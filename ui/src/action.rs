@@ -200,7 +200,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::First, "first", &["Home"], G::Views, "to the first"),
         row(A::Last, "last", &["End"], G::Views, "to the last"),
         row(A::Open, "open", &["Enter"], G::Views, "details; never starts motion, acknowledges no stop; Trials of a replay: to the trial"),
-        row(A::Report, "report", &["R"], G::Views, "tables of the study, as quadfrog report prints them"),
+        row(A::Report, "report", &["R"], G::Views, "tables of the study; quadfrog report adds other sessions"),
 
         row(A::Freeze, "freeze", &["z"], G::Charts, "freeze the charts; while a trial waits for its verdict: that trial or the present"),
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),

@@ -115,7 +115,7 @@ impl Experiment {
             false => self.publish_model(trial),
         }
         let message = format!(
-            "trial {trial} waits for its verdict since the last session: it was measured, its jump is in that session's recording"
+            "trial {trial} had no verdict at the end of the last session: it was measured, its jump is in that session's recording"
         );
         self.warn(message);
         Ok(())

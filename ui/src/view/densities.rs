@@ -13,7 +13,9 @@ use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &ParameterInfo, theme: &Theme) {
-    let insight = session.insight.as_ref();
+    // A finished study that is continued has none of a proposal.
+    let of_proposal = |insight: &&ProposalInsight| !insight.parameters.is_empty() || !insight.predicted.is_empty();
+    let insight = session.insight.as_ref().filter(of_proposal);
     let modelled = insight.is_some_and(|insight| !insight.predicted.is_empty());
     let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
     let importance = parameter.and_then(|parameter| parameter.importance);
@@ -24,7 +26,11 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
         _ => parameter.is_some_and(|parameter| render_densities(frame, body, parameter, info, theme)),
     };
     if !drawn && body.height > 0 {
-        let reason = if insight.is_some() { "sampled without a model" } else { "no proposal yet" };
+        let reason = match (insight, &session.insight) {
+            (Some(_), _) => "sampled without a model",
+            (None, Some(_)) => "no proposal in this session",
+            (None, None) => "no proposal yet",
+        };
         let text = truncate(reason, usize::from(body.width));
         frame.buffer_mut().set_string(body.x, body.y, text, theme.style(Role::Quiet));
     }
