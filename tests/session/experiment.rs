@@ -177,7 +177,9 @@ fn a_measured_trial_waits_for_its_verdict_across_sessions() {
     assert_eq!(measured(session.under_review()), before, "measured, value by hand and suggestion as before");
     let records = session.take_records();
     let log = records.iter().find_map(|record| match record {
-        Record::Log(line) if line.message.contains("waits for its verdict") => Some(&line.message),
+        Record::Log(line) if line.message.contains("had no verdict at the end of the last session") => {
+            Some(&line.message)
+        }
         _ => None,
     });
     assert!(log.is_some(), "the operator is shown why it waits");
