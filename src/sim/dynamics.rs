@@ -220,7 +220,19 @@ fn column<S: Simd>(
     origin_hip: &Vector3<Lanes<S>>,
 ) -> [Lanes<S>; 6] {
     let SpatialForce { linear, angular } = f.in_parent(hip, origin_hip);
-    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+    stack(&linear, &angular)
+}
+
+/// C^-1 u.
+#[inline(always)]
+fn lower<T: Real>([i11, i21, i22, i31, i32, i33]: &[T; 6], [u1, u2, u3]: [T; 3]) -> [T; 3] {
+    [*i11 * u1, *i21 * u1 + *i22 * u2, *i31 * u1 + *i32 * u2 + *i33 * u3]
+}
+
+/// C^-T y.
+#[inline(always)]
+fn lower_transposed<T: Real>([i11, i21, i22, i31, i32, i33]: &[T; 6], [y1, y2, y3]: [T; 3]) -> [T; 3] {
+    [*i11 * y1 + *i21 * y2 + *i31 * y3, *i22 * y2 + *i32 * y3, *i33 * y3]
 }
 
 /// Factors H + diag(`added`): C^-1 and G = H^-1 F^T.
@@ -244,16 +256,13 @@ fn factor<S: Simd>(
     let i31 = -(c31 * i11 + c32 * i21) * i33;
     // G = C^-T (C^-1 F^T)
     let [f1, f2, f3] = coupling;
+    let inverse = [i11, i21, i22, i31, i32, i33];
     let mut gain = *coupling;
     for k in 0..6 {
-        let y1 = i11 * f1[k];
-        let y2 = i21 * f1[k] + i22 * f2[k];
-        let y3 = i31 * f1[k] + i32 * f2[k] + i33 * f3[k];
-        gain[0][k] = i11 * y1 + i21 * y2 + i31 * y3;
-        gain[1][k] = i22 * y2 + i32 * y3;
-        gain[2][k] = i33 * y3;
+        let y = lower(&inverse, [f1[k], f2[k], f3[k]]);
+        [gain[0][k], gain[1][k], gain[2][k]] = lower_transposed(&inverse, y);
     }
-    ([i11, i21, i22, i31, i32, i33], gain)
+    (inverse, gain)
 }
 
 impl LegDynamics {
@@ -367,10 +376,8 @@ impl Dynamics {
         // z_l = H_l^-1 (tau_l - c_l) with H_l^-1 = C^-T C^-1;  I_A a_0 = -b_0 - sum F_l z_l;  ddq_l = z_l - G_l a_0
         let [t1, t2, t3] = joint_lanes(simd, torque);
         let bias = |i: usize| Lanes::load(simd, self.legs.bias[i]);
-        let (u1, u2, u3) = (t1 - bias(0), t2 - bias(1), t3 - bias(2));
-        let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse(simd);
-        let (y1, y2, y3) = (i11 * u1, i21 * u1 + i22 * u2, i31 * u1 + i32 * u2 + i33 * u3);
-        let free = [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3];
+        let inverse = self.legs.factor_inverse(simd);
+        let free = lower_transposed(&inverse, lower(&inverse, [t1 - bias(0), t2 - bias(1), t3 - bias(2)]));
         let mut trunk = self.bias;
         for (i, trunk) in trunk.iter_mut().enumerate() {
             *trunk = -*trunk - self.legs.couple(simd, i, &free);
@@ -416,9 +423,7 @@ impl Dynamics {
     pub fn joint_change(&self, sums: &PerLeg<Vector3<f64>>, trunk: &Six) -> PerLeg<Vector3<f64>> {
         let change = with_lanes!(self.instructions, simd => {
             let y = |i: usize| Lanes::new(simd, [sums[0][i], sums[1][i], sums[2][i], sums[3][i]]);
-            let (y1, y2, y3) = (y(0), y(1), y(2));
-            let [i11, i21, i22, i31, i32, i33] = self.legs.factor_inverse(simd);
-            let own = [i11 * y1 + i21 * y2 + i31 * y3, i22 * y2 + i32 * y3, i33 * y3];
+            let own = lower_transposed(&self.legs.factor_inverse(simd), [y(0), y(1), y(2)]);
             joints(self.legs.follow(simd, &own, trunk))
         });
         std::array::from_fn(|l| leg_of(&change, l))

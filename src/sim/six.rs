@@ -1,13 +1,13 @@
 //! Vectors and symmetric matrices of six: velocities of the trunk, the rows of a leg.
 
-use nalgebra::Vector3;
+use nalgebra::{Scalar, Vector3};
 
 /// A six-vector. A plain array, which the compiler vectorizes.
 pub(super) type Six = [f64; 6];
 
 /// Joins linear and angular part.
-#[inline]
-pub(super) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Six {
+#[inline(always)]
+pub(super) fn stack<T: Scalar + Copy>(linear: &Vector3<T>, angular: &Vector3<T>) -> [T; 6] {
     [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
 }
 
