@@ -14,10 +14,12 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobO
     let again = format!("{trial} is void, and its parameters are proposed again");
     let output = match request {
         OperatorRequest::Judge(verdict) => {
-            let answer = format!(
-                "{trial}; u takes it back until the next trial is approved or skipped, the best is confirmed, or the session ends"
-            );
-            judged(experiment.judge(*verdict, false), answer)
+            let answer = format!("{trial}; u takes it back until the next trial");
+            let done = match asker {
+                Asker::Operator => experiment.judge(*verdict, false),
+                Asker::Rule => experiment.judge_by_rule(*verdict),
+            };
+            judged(done, answer)
         }
         OperatorRequest::Rerun { trial: None } => judged(experiment.judge(Verdict::Void, true), again),
         OperatorRequest::VoidBecause { reason, rerun: false } => {
