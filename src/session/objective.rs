@@ -224,7 +224,7 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::NotQuiet => (Verdict::Fall, "did not come to rest".into()),
         TrialEnd::Fell(cause) => (Verdict::Fall, cause.to_string()),
         TrialEnd::Stopped => (Verdict::Void, "STOP was pressed".into()),
-        TrialEnd::Cancelled => (Verdict::Void, "cancelled by the operator".into()),
+        TrialEnd::Cancelled => (Verdict::Void, "countdown cancelled, the robot did not jump".into()),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
         TrialEnd::Held(inhibit) => (Verdict::Void, format!("no further jump: {inhibit}")),
         TrialEnd::SatDown => (Verdict::Void, "no further jump: sat down by the operator".into()),

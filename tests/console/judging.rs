@@ -451,7 +451,7 @@ fn a_verdict_key_that_is_pressed_twice_judges_once_and_keeps_the_first_answer() 
 fn after_a_cancelled_countdown_the_line_names_the_key_that_keeps_the_point() {
     let mut console = Console::ready();
     console.stage(ExperimentStage::Running, 0);
-    let cause = "cancelled by the operator".into();
+    let cause = "countdown cancelled, the robot did not jump".into();
     console.record(Record::Trial(TrialRecord { cause, ..trial(0, None, Some(Verdict::Void)) }));
     console.stage(ExperimentStage::Review, 0);
     for (columns, rows) in [(80, 24), (120, 40)] {

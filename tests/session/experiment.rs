@@ -157,6 +157,19 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
     assert!(experiment.undo().is_err(), "the verdict was told when the next trial began");
 }
 
+/// Regression: the cause of the row that a cancelled countdown leaves did not say that the robot had not jumped.
+#[test]
+fn the_row_of_a_cancelled_countdown_says_that_the_robot_did_not_jump() {
+    let mut experiment = experiment(5);
+    let trial = run(&mut experiment, TrialEnd::Cancelled).trial;
+    let row = experiment.row(trial).unwrap();
+    assert_eq!(row.cause, "countdown cancelled, the robot did not jump");
+    assert_eq!(row.suggested, Some(Verdict::Void));
+    experiment.judge(Verdict::Void, true).unwrap();
+    // The study has begun the trial at its approval: the re-run has another number.
+    assert_eq!(experiment.proposal().map(|proposal| (proposal.trial, proposal.parent)), Some((trial + 1, Some(trial))));
+}
+
 /// Regression: a session that ended in the review made the measured jump void, and the value by hand was lost with it.
 #[test]
 fn a_measured_trial_waits_for_its_verdict_across_sessions() {
