@@ -460,6 +460,15 @@ fn after_a_cancelled_countdown_the_line_names_the_key_that_keeps_the_point() {
     }
 }
 
+/// Regression: the last line of a fall named neither the key of a value by hand nor that of a note, also where it had room for them.
+#[test]
+fn the_line_of_a_fall_names_value_by_hand_and_note_where_it_has_room() {
+    let console = Console::review(Mode::Damped, Verdict::Fall);
+    let last = |columns: u16| console.screen(columns, 40).lines().last().unwrap().to_owned();
+    assert_shows(&last(200), &["FELL", "f fall (suggested)", "q quit", "= value by hand", "m note"]);
+    assert_shows(&last(80), &["FELL", "k acknowledges", "f fall (suggested)"]);
+}
+
 /// Regression: letters of a reason whose field had not opened were commands; the r among them queued a jump.
 #[test]
 fn a_judged_row_is_queued_again_after_a_question() {

@@ -141,7 +141,9 @@ fn live(model: &Model) -> NextStep {
                 |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
             let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
             let rerun = if review { &[(Action::Rerun, "re-run")][..] } else { &[] };
-            step(lead, model, &[&verdicts[..], rerun, &[undo, quit]].concat())
+            let more = [(Action::HandValue, "value by hand"), (Action::Note, "note")];
+            let more = if review { &more[..] } else { &[] };
+            step(lead, model, &[&verdicts[..], rerun, &[undo, quit], more].concat())
         }
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
