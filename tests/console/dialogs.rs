@@ -228,6 +228,26 @@ fn the_checks_of_a_simulation_begin_at_the_top_and_confirm_nothing() {
     assert_shows(&console.screen(80, 24), &["3 passed (P)", "24 more: P shows all"]);
 }
 
+/// Regression: of a standing robot Health showed the tilt of the one that had lain on its back before it was armed.
+#[test]
+fn a_check_that_is_not_needed_shows_its_value_only_before_arming() {
+    let mut console = Console::ready();
+    console.record(Record::ArmingChecks(vec![ArmingCheckRecord {
+        check: ArmingCheck::Upright,
+        found: "tilted 3.14 rad".into(),
+        needed: "at most 0.20 rad".into(),
+        state: ArmingCheckState::NotNeeded,
+    }]));
+    for keys in [&["5"][..], &["P"]] {
+        console.press(keys);
+        for mode in [Mode::Ready, Mode::Disarmed, Mode::Jump] {
+            console.mode(mode);
+            let line = line_with(&console.screen(120, 40), "n/a  upright");
+            assert_eq!(line.contains("tilted 3.14 rad"), mode == Mode::Disarmed, "{mode:?}: {line}");
+        }
+    }
+}
+
 /// Regression: "2 not yet" stood over a page on which one was seen; the test of STOP came last.
 #[test]
 fn what_the_operator_has_to_do_is_on_the_first_page() {

@@ -100,6 +100,8 @@ fn line(
     let gap = name_width.max(name.chars().count() + 1) - name.chars().count();
     let wide = width.is_none_or(|width| width >= WIDE);
     let text = match (item.found.as_str(), item.needed.as_str()) {
+        // A value of an earlier time that decided nothing.
+        (found, _) if past && item.state == ArmingCheckState::NotNeeded && !found.is_empty() => String::new(),
         (found, needed) if wide && item.state == ArmingCheckState::NotNeeded && !found.is_empty() => {
             format!("{found} ({needed})")
         }
