@@ -271,3 +271,20 @@ fn the_sign_of_a_trial_under_the_charts_is_explained() {
     console.press(&["?"]);
     assert_shows(&console.screen(120, 100), &["under the charts, ~ in Trials"]);
 }
+
+/// Regression: `~` marked the first and the second of two compared trials, which the charts call A and B.
+#[test]
+fn two_compared_trials_are_marked_as_the_charts_name_them() {
+    let mut console = Console::ready();
+    for trial in 0..2 {
+        for time_ms in (0..1_000).step_by(5) {
+            let jump = Some((trial, time_ms as f64 / 1e3 - 0.5, Phase::Impulse));
+            console.tick(tick(u64::from(trial) * 2_000 + time_ms, 0.1, jump));
+        }
+    }
+    console.judged(3);
+    console.press(&["2", "Home", "c", "Down", "c"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["Trials, A and B compared ", "   0A ", ">  1B ", "   2  "]);
+    assert!(!screen.contains('~'), "{screen}");
+}

@@ -158,7 +158,7 @@ fn the_trial_at_the_playhead_is_a_and_the_selected_one_in_trials_is_b() {
     session.send("G#5\r");
     session.wait_for(&["A #1 line, B #5 dotted"]);
     session.send("2");
-    session.wait_until("B is marked", || session.screen().contains("  5~"));
+    session.wait_for(&["A and B compared", "  1A", "  5B"]);
     session.send("q");
     assert!(session.wait().success());
 }

@@ -206,7 +206,7 @@ fn any_two_trials_are_compared_in_live() {
         console.said(),
         &["A is trial 0, B is trial 2: 1 shows both in Live; there Left and Right move the cursor"],
     );
-    assert!(line_with(&console.screen(80, 24), "   0~").contains("accept"));
+    assert!(line_with(&console.screen(80, 24), "   0A").contains("accept"));
     console.press(&["1"]);
     let screen = console.screen(120, 40);
     assert!(screen.contains("A #0 line, B #2 dotted, at +0.00 s"), "{screen}");

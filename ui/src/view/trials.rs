@@ -12,6 +12,7 @@ use crate::action::Action;
 use crate::column::Column;
 use crate::layout::first_row;
 use crate::model::Model;
+use crate::model::comparison::Comparison;
 use crate::model::trials::{SortBy, measured};
 use crate::text::remark;
 use crate::theme::Role;
@@ -21,7 +22,12 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let title = if later > 0 { format!("Trials, {later} after the playhead (+)") } else { "Trials".to_owned() };
     let (rows, room) = (model.trial_rows().len(), usize::from(area.height).saturating_sub(2));
     let number = if rows > room { format!(" ({room} of {rows})") } else { String::new() };
-    let legend = if laid_under(model).any(|_| true) { ", ~ under the charts" } else { "" };
+    let legend = match &model.live.comparison {
+        Some(Comparison { b, .. }) if b.recording.is_none() => ", A and B compared",
+        Some(_) => ", A compared",
+        None if model.live.ghost.is_some() => ", ~ under the charts",
+        None => "",
+    };
     let titles = [format!("{title}{legend}{number}"), format!("{title}{number}"), title];
     let summaries = summaries(model);
     // The most important form that has room: the number of rows gives way before a verdict's count.
@@ -33,10 +39,16 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     render_table(frame, body, model, true);
 }
 
-/// The trials that are laid under the charts or under another trial.
-fn laid_under(model: &Model) -> impl Iterator<Item = u32> {
-    let beside = model.live.comparison.as_ref().map(|compared| &compared.b).filter(|b| b.recording.is_none());
-    [model.live.ghost, beside.map(|b| b.trial)].into_iter().flatten()
+/// The character behind the number of a trial: `A` and `B` as the charts name two that are compared, `+` after the playhead of a
+/// replay, `~` under the charts.
+fn mark(model: &Model, trial: u32) -> &'static str {
+    match &model.live.comparison {
+        Some(Comparison { a, .. }) if a.trial == trial => "A",
+        Some(Comparison { b, .. }) if b.trial == trial && b.recording.is_none() => "B",
+        _ if model.is_later(trial) => "+",
+        None if model.live.ghost == Some(trial) => "~",
+        _ => " ",
+    }
 }
 
 /// The number of each verdict with the order, filter and columns of the table, from the longest to the shortest: shorter keys before
@@ -197,13 +209,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let selected = selected_trial == Some(trial.trial);
         let style = if selected { theme.style(Role::Selected) } else { Style::new() };
         let area = Rect { y: area.y + 1 + line as u16, height: 1, ..area };
-        let ghost = laid_under(model).any(|under| under == trial.trial);
         let later = model.is_later(trial.trial);
-        let mark = match (later, ghost) {
-            (true, _) => "+",
-            (false, true) => "~",
-            (false, false) => " ",
-        };
+        let mark = mark(model, trial.trial);
         let cursor = if selected && model.chooses_row() { ">" } else { " " };
         let number = format!("{cursor}{:>3}{mark}", trial.trial);
         let mut spans = vec![span(theme, if later { Role::Quiet } else { Role::Text }, number)];
