@@ -882,6 +882,9 @@ pub struct Trial {
     /// ranges from which the parameters were drawn
     #[prost(message, repeated, tag = "19")]
     pub ranges: ::prost::alloc::vec::Vec<trial::Range>,
+    /// origin of the verdict; none without a verdict, and in older recordings
+    #[prost(enumeration = "trial::JudgedBy", optional, tag = "20")]
+    pub judged_by: ::core::option::Option<i32>,
 }
 /// Nested message and enum types in `Trial`.
 pub mod trial {
@@ -1002,8 +1005,11 @@ pub mod trial {
         pub cause: ::prost::alloc::string::String,
         #[prost(message, optional, tag = "5")]
         pub measured: ::core::option::Option<Measured>,
+        /// none in older recordings
+        #[prost(enumeration = "JudgedBy", optional, tag = "6")]
+        pub judged_by: ::core::option::Option<i32>,
     }
-    /// Verdict of the operator.
+    /// Verdict of the operator or of a rule.
     #[derive(
         Clone,
         Copy,
@@ -1039,6 +1045,45 @@ pub mod trial {
                 "ACCEPT" => Some(Self::Accept),
                 "FALL" => Some(Self::Fall),
                 "VOID" => Some(Self::Void),
+                _ => None,
+            }
+        }
+    }
+    /// Origin of a verdict.
+    #[derive(
+        Clone,
+        Copy,
+        Debug,
+        PartialEq,
+        Eq,
+        Hash,
+        PartialOrd,
+        Ord,
+        ::prost::Enumeration
+    )]
+    #[repr(i32)]
+    pub enum JudgedBy {
+        /// a person
+        Operator = 0,
+        /// the program by its rules, without a person
+        Rule = 1,
+    }
+    impl JudgedBy {
+        /// String value of the enum field names used in the ProtoBuf definition.
+        ///
+        /// The values are not transformed in any way and thus are considered stable
+        /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+        pub fn as_str_name(&self) -> &'static str {
+            match self {
+                Self::Operator => "OPERATOR",
+                Self::Rule => "RULE",
+            }
+        }
+        /// Creates an enum from field names used in the ProtoBuf definition.
+        pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+            match value {
+                "OPERATOR" => Some(Self::Operator),
+                "RULE" => Some(Self::Rule),
                 _ => None,
             }
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::trial::{TrialRecord, Verdict};
+use crate::trial::{JudgedBy, TrialRecord, Verdict};
 
 /// Name of the attachment.
 pub const NAME: &str = "trials.csv";
@@ -19,9 +19,10 @@ pub fn csv(rows: &BTreeMap<u32, TrialRecord>, spans: &BTreeMap<u32, TrialSpan>) 
         }
     }
     let mut table = csv::Writer::from_writer(Vec::new());
-    let fixed = ["trial", "source", "parent", "verdict", "cause", "value", "hand_value", "seed", "start_ns", "end_ns"];
+    let verdict = ["verdict", "judged_by", "cause", "value", "hand_value"];
     let measured = ["dx_m", "dy_m", "dyaw_rad", "rise_m", "air_s", "note"];
-    let head = fixed.iter().chain(&parameters).chain(&measured);
+    let head = ["trial", "source", "parent"].iter().chain(&verdict).chain(&["seed", "start_ns", "end_ns"]);
+    let head = head.chain(&parameters).chain(&measured);
     // A Vec takes every line.
     let _ = table.write_record(head);
     for row in rows.values() {
@@ -33,6 +34,7 @@ pub fn csv(rows: &BTreeMap<u32, TrialRecord>, spans: &BTreeMap<u32, TrialSpan>) 
             row.source.name().to_owned(),
             whole(row.parent.map(u64::from)),
             row.verdict.map_or("", Verdict::name).to_owned(),
+            row.judged_by.map_or("", JudgedBy::name).to_owned(),
             row.cause.clone(),
             number(row.value),
             number(row.hand_value),

@@ -47,7 +47,8 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.list(&mut ours.repeats, &mut m.repeats, repeat)?;
     way.copy(&mut ours.seed, &mut m.seed);
     way.list(&mut ours.ranges, &mut m.ranges, drawn_range)?;
-    way.option(&mut ours.expected, &mut m.expected, expected)
+    way.option(&mut ours.expected, &mut m.expected, expected)?;
+    way.maybe_variant(&mut ours.judged_by, &mut m.judged_by, "origin of a verdict")
 }
 
 fn drawn_range(way: Way, ours: &mut DrawnRange, m: &mut frog::trial::Range) -> Done {
@@ -62,7 +63,8 @@ fn repeat(way: Way, ours: &mut RepeatRecord, m: &mut frog::trial::Repeat) -> Don
     way.maybe_variant(&mut ours.verdict, &mut m.verdict, "verdict")?;
     way.copy(&mut ours.value, &mut m.value);
     way.copy(&mut ours.cause, &mut m.cause);
-    way.option(&mut ours.measured, &mut m.measured, measured)
+    way.option(&mut ours.measured, &mut m.measured, measured)?;
+    way.maybe_variant(&mut ours.judged_by, &mut m.judged_by, "origin of a verdict")
 }
 
 fn measured(way: Way, ours: &mut MeasuredJump, m: &mut frog::trial::Measured) -> Done {

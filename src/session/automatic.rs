@@ -97,7 +97,7 @@ pub fn run_watched<R: Robot>(
             let reason = format!("trial {trial} waits for the verdict of a person: continue its study in the console");
             return Err(RequestRefusal::NotNow(reason));
         };
-        experiment.judge(suggested, false)?;
+        experiment.judge_by_rule(suggested)?;
     }
     loop {
         let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
@@ -138,7 +138,7 @@ pub fn run_watched<R: Robot>(
         let (end, ticks) = rollout.run(&spec);
         experiment.ended(spec.trial, &end, ticks, ticks.len() as u64);
         let suggested = experiment.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
-        match experiment.judge(suggested, false) {
+        match experiment.judge_by_rule(suggested) {
             Err(RequestRefusal::EndedElsewhere(_)) => continue,
             judged => judged?,
         }

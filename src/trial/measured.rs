@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use super::{Task, Verdict};
+use super::{JudgedBy, Task, Verdict};
 
 /// Part of the cause of a verdict that was changed after it had become final; the operator's reason stands before it. Earlier versions
 /// began the cause with it.
@@ -121,6 +121,9 @@ pub struct RepeatRecord {
     pub seed: u64,
     /// Its verdict; a void repeat is done again.
     pub verdict: Option<Verdict>,
+    /// Origin of its verdict; none in records of an earlier version.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub judged_by: Option<JudgedBy>,
     /// Its value: 0 for a fall, none for void.
     pub value: Option<f64>,
     /// Reason of the verdict.

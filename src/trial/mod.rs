@@ -11,7 +11,7 @@ pub use self::overrides::Overrides;
 pub use self::parameters::{
     GAIN_UNITS, Gains, JumpParameters, ParameterInfo, ParameterValues, is_gain, other_gains, parameter_unit,
 };
-pub use self::record::{NOT_RUN, REMOVED, SKIPPED, TrialRecord};
+pub use self::record::{NOT_RUN, REMOVED, SKIPPED, TrialRecord, is_changed_verdict};
 pub use self::search::{
     DrawnRange, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint,
     SearchStatus, SearchedParameter, SimulatorComparison, WorldResemblance,
@@ -276,6 +276,27 @@ pub enum Verdict {
 impl Verdict {
     /// All verdicts.
     pub const ALL: [Verdict; Verdict::VARIANTS.len()] = *Verdict::VARIANTS.first_chunk().unwrap();
+
+    /// Returns the name on screens and in files.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// Origin of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, EnumString, IntoStaticStr, VariantArray)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum JudgedBy {
+    /// A person.
+    Operator,
+    /// The program by its rules: automatic approval, the end of a session, a trial that a program has left.
+    Rule,
+}
+
+impl JudgedBy {
+    /// All origins.
+    pub const ALL: [JudgedBy; JudgedBy::VARIANTS.len()] = *JudgedBy::VARIANTS.first_chunk().unwrap();
 
     /// Returns the name on screens and in files.
     pub fn name(self) -> &'static str {

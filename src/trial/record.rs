@@ -1,8 +1,8 @@
 //! The row of a trial: values, verdict, origin.
 
 use super::{
-    CHANGED, DrawnRange, ExpectedResult, FallRisk, MeasuredJump, ParameterValues, ProposalSource, RepeatRecord,
-    Verdict, other_gains,
+    CHANGED, DrawnRange, ExpectedResult, FallRisk, JudgedBy, MeasuredJump, ParameterValues, ProposalSource,
+    RepeatRecord, Verdict, other_gains,
 };
 
 /// A row of the trial table.
@@ -28,6 +28,9 @@ pub struct TrialRecord {
     pub cause: String,
     /// The verdict; none while it runs or waits.
     pub verdict: Option<Verdict>,
+    /// Origin of the verdict: of a trial with several rollouts the operator if one of theirs is; none without a verdict, for a trial
+    /// that did not run, and for one of another program or of an earlier version.
+    pub judged_by: Option<JudgedBy>,
     /// The operator's note.
     pub note: String,
     /// Distance to earlier falls at its approval.
@@ -109,7 +112,7 @@ impl TrialRecord {
     pub fn is_overruled(&self) -> bool {
         let otherwise =
             self.verdict.is_some() && self.suggested.is_some_and(|suggested| Some(suggested) != self.verdict);
-        otherwise || OperatorsWords::of(&self.cause).is_some_and(|words| words.act.starts_with(CHANGED))
+        otherwise || is_changed_verdict(&self.cause)
     }
 
     /// Returns the operator's reason of a verdict, empty without one, and the rest of the cause as one sentence; none where the rules
@@ -133,6 +136,11 @@ impl TrialRecord {
     pub fn counted_repeats(&self) -> u32 {
         self.repeats.iter().filter(|repeat| repeat.verdict != Some(Verdict::Void)).count() as u32
     }
+}
+
+/// Returns whether `cause` is that of a verdict that the operator has changed after it had become final.
+pub fn is_changed_verdict(cause: &str) -> bool {
+    OperatorsWords::of(cause).is_some_and(|words| words.act.starts_with(CHANGED))
 }
 
 /// The parts of a cause that begins with words of the operator.

@@ -208,7 +208,7 @@ fn a_session_can_be_rebuilt_from_its_file_alone() {
         lines
             .next()
             .unwrap()
-            .starts_with("trial,source,parent,verdict,cause,value,hand_value,seed,start_ns,end_ns,f0,")
+            .starts_with("trial,source,parent,verdict,judged_by,cause,value,hand_value,seed,start_ns,end_ns,f0,")
     );
     let mut last_end = 0;
     for (trial, line) in (0_u64..).zip(lines) {

@@ -8,7 +8,7 @@ use experiment::{plan, skip, study, study_in, ticks, without_journal};
 use quadfrog::optimize::study::Storage;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
-use quadfrog::trial::{ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{ExperimentStage, JudgedBy, TrialRecord, Verdict};
 
 const FELL: TrialEnd = TrialEnd::Fell(FallCause::BodyContact);
 
@@ -111,6 +111,33 @@ fn a_verdict_on_a_rollout_can_be_undone() {
     assert_eq!((experiment.stage(), row(&experiment, 0).repeats.len()), (ExperimentStage::Review, 2));
     experiment.judge(Verdict::Fall, false).unwrap();
     assert!((row(&experiment, 0).value.unwrap() - 0.4).abs() < 1e-12);
+}
+
+#[test]
+fn a_trial_is_the_operators_if_one_of_its_rollouts_is() {
+    let (operator, rule) = (Some(JudgedBy::Operator), Some(JudgedBy::Rule));
+    for (operators, expected) in [(None, rule), (Some(0), operator), (Some(2), operator)] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = three_in(folder.path());
+        for rollout in 0..3 {
+            roll(&mut experiment, TrialEnd::Settled, 0.6);
+            assert_eq!(row(&experiment, 0).judged_by, None, "before the verdict");
+            if operators == Some(rollout) {
+                experiment.judge(Verdict::Accept, false).unwrap();
+            } else {
+                experiment.judge_by_rule(Verdict::Accept).unwrap();
+            }
+        }
+        experiment.close().unwrap();
+        let again = three_in(folder.path());
+        for experiment in [&experiment, &again] {
+            let trial = row(experiment, 0);
+            assert_eq!(trial.judged_by, expected);
+            let of_rollouts: Vec<_> = trial.repeats.iter().map(|repeat| repeat.judged_by).collect();
+            let of_rollout = |rollout| if operators == Some(rollout) { operator } else { rule };
+            assert_eq!(of_rollouts, [0, 1, 2].map(of_rollout));
+        }
+    }
 }
 
 /// A program that is killed between or in rollouts: the next one continues with those that were judged, with the same seeds.

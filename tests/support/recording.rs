@@ -307,6 +307,7 @@ impl Draw {
                 suggested: self.option(|d| d.one_of(&Verdict::ALL)),
                 cause: self.string(),
                 verdict: self.option(|d| d.one_of(&Verdict::ALL)),
+                judged_by: self.option(|d| d.one_of(&JudgedBy::ALL)),
                 note: self.string(),
                 risk: self.risk(),
                 expected: self.option(Draw::expected),
@@ -316,6 +317,7 @@ impl Draw {
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),
                     verdict: d.option(|d| d.one_of(&Verdict::ALL)),
+                    judged_by: d.option(|d| d.one_of(&JudgedBy::ALL)),
                     value: d.option(Draw::number),
                     cause: d.string(),
                     measured: d.option(Draw::measured),

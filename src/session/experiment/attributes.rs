@@ -13,8 +13,8 @@ use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
-    Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, MeasuredJump, ParameterInfo, ParameterValues, Proposal,
-    ProposalSource, RepeatRecord, Task, TrialRecord, Verdict,
+    Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, JudgedBy, MeasuredJump, ParameterInfo, ParameterValues,
+    Proposal, ProposalSource, RepeatRecord, Task, TrialRecord, Verdict, is_changed_verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -246,10 +246,11 @@ pub struct RepeatsAttribute<'a> {
 }
 
 /// Attributes that are written when a trial was measured, and when it is judged; before the verdict, and after it was taken back,
-/// the verdict is null.
+/// the verdict and its origin are null.
 #[derive(Debug, Serialize)]
 pub struct JudgedAttributes<'a> {
     verdict: Option<Verdict>,
+    judged_by: Option<JudgedBy>,
     suggested: Option<Verdict>,
     cause: &'a str,
     value: Option<f64>,
@@ -265,9 +266,10 @@ pub struct JudgedAttributes<'a> {
 impl JudgedAttributes<'_> {
     /// Returns the attributes of the row; `rerun` queues the parameters again.
     pub fn of(row: &TrialRecord, rerun: bool) -> JudgedAttributes<'_> {
-        let TrialRecord { verdict, suggested, cause, value, hand_value, measured, repeats, .. } = row;
+        let TrialRecord { verdict, judged_by, suggested, cause, value, hand_value, measured, repeats, .. } = row;
         JudgedAttributes {
             verdict: *verdict,
+            judged_by: *judged_by,
             suggested: *suggested,
             cause,
             value: *value,
@@ -283,6 +285,8 @@ impl JudgedAttributes<'_> {
 #[derive(Debug, Serialize)]
 pub struct InterruptedAttributes<'a> {
     pub verdict: Verdict,
+    /// None for a trial that did not run.
+    pub judged_by: Option<JudgedBy>,
     pub cause: &'a str,
     pub rerun: bool,
     pub interrupted: bool,
@@ -310,6 +314,8 @@ pub struct TrialAttributes {
     #[serde(deserialize_with = "numbers")]
     pub fixed: ParameterValues,
     pub verdict: Option<Verdict>,
+    /// Origin of the verdict; none for a trial of an earlier version.
+    pub judged_by: Option<JudgedBy>,
     pub suggested: Option<Verdict>,
     /// Reason of the suggestion, or of another verdict.
     pub cause: Option<String>,
@@ -390,6 +396,11 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     let parameter = |name: &str| trial.parameter(name).or_else(|| value_of(&given, name));
     // A verdict that can still be taken back has its value already.
     let judged = trial.state == TrialState::Running && matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall));
+    // A verdict that does not fit the trial's state was overruled by another program.
+    let verdict = kept.verdict.filter(fits);
+    let cause = kept.cause.unwrap_or_default();
+    // A change of the verdict leaves the attributes of the trial as they were.
+    let changed = is_changed_verdict(&cause).then_some(JudgedBy::Operator);
     let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
     TrialRecord {
         trial: trial.number,
@@ -400,9 +411,9 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         value: trial.value.or(kept.value.filter(|_| judged)),
         hand_value: kept.hand_value,
         suggested: kept.suggested,
-        cause: kept.cause.unwrap_or_default(),
-        // A verdict that does not fit the trial's state was overruled by another program.
-        verdict: kept.verdict.filter(fits).or(of_state),
+        cause,
+        verdict: verdict.or(of_state),
+        judged_by: verdict.and(changed.or(kept.judged_by)),
         note,
         risk: kept.risk,
         expected: parse(&trial.user_attributes, |_| true),

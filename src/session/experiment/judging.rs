@@ -6,7 +6,7 @@ use super::{Experiment, ExperimentState, PendingVerdict};
 use crate::optimize::study::{Outcome, StudyError};
 use crate::session::objective;
 use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{JumpParameters, TrialRecord, Verdict};
+use crate::trial::{JudgedBy, JumpParameters, TrialRecord, Verdict};
 
 const NOT_UNDER_REVIEW: &str = "no trial is under review";
 
@@ -51,20 +51,32 @@ impl Experiment {
         }
     }
 
-    /// Judges the trial under review; with `rerun` its parameters are queued again.
+    /// Judges the trial under review for the operator; with `rerun` its parameters are queued again.
     /// Refused when no trial is under review, an accepted trial has no value, or a trial that tripped a limit is judged void
     /// without a reason.
     pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
-        self.judge_because(verdict, rerun, "")
+        self.judge_because(verdict, JudgedBy::Operator, rerun, "")
+    }
+
+    /// Judges the trial under review by a rule of the program, without a person.
+    /// Refused as [`Experiment::judge`].
+    pub fn judge_by_rule(&mut self, verdict: Verdict) -> Result<(), RequestRefusal> {
+        self.judge_because(verdict, JudgedBy::Rule, false, "")
     }
 
     /// Judges the trial under review void for a reason of the operator; with `rerun` its parameters are queued again.
     /// Refused when no trial is under review.
     pub fn void_because(&mut self, reason: &str, rerun: bool) -> Result<(), RequestRefusal> {
-        self.judge_because(Verdict::Void, rerun, reason.trim())
+        self.judge_because(Verdict::Void, JudgedBy::Operator, rerun, reason.trim())
     }
 
-    fn judge_because(&mut self, verdict: Verdict, rerun: bool, reason: &str) -> Result<(), RequestRefusal> {
+    fn judge_because(
+        &mut self,
+        verdict: Verdict,
+        by: JudgedBy,
+        rerun: bool,
+        reason: &str,
+    ) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
         if verdict == Verdict::Void && reason.is_empty() && objective::tripped_limit(row) {
@@ -82,7 +94,7 @@ impl Experiment {
             }
         };
         let suggestion = row.clone();
-        row.verdict = Some(verdict);
+        (row.verdict, row.judged_by) = (Some(verdict), Some(by));
         row.value = value;
         let repeats = self.plan.control.repeats;
         if let Some(suggested) = row.suggested.filter(|suggested| *suggested != verdict) {
@@ -175,7 +187,7 @@ impl Experiment {
         let limit = objective::tripped_limit(row);
         if limit && self.plan.control.repeats > 1 {
             // The judged rollouts are kept; a session that continues the study does the others.
-            if let Err(error) = self.judge(Verdict::Fall, false) {
+            if let Err(error) = self.judge_by_rule(Verdict::Fall) {
                 self.log(error.to_string());
             }
             return self.report_verdict().map(drop);
@@ -185,7 +197,7 @@ impl Experiment {
             return Ok(());
         }
         let before = row.clone();
-        row.verdict = Some(verdict);
+        (row.verdict, row.judged_by) = (Some(verdict), Some(JudgedBy::Rule));
         if let Err(error) = self.write_closed(trial, limit, &before.cause) {
             // On the disk it has no verdict.
             self.rows.insert(trial, before);

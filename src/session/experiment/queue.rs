@@ -12,7 +12,7 @@ use super::attributes::{self, Attributes, InterruptedAttributes, Origin, TrialAt
 use super::liveness::Liveness;
 use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::{ParameterValues, Verdict};
+use crate::trial::{JudgedBy, NOT_RUN, ParameterValues, Verdict};
 
 #[derive(Debug)]
 pub struct TrialQueue {
@@ -99,6 +99,7 @@ fn close_all(study: &mut Study, trials: &[Trial], cause: &str) -> Result<Vec<Str
             None => {
                 let last = attributes::write(&InterruptedAttributes {
                     verdict: Verdict::Void,
+                    judged_by: (!cause.starts_with(NOT_RUN)).then_some(JudgedBy::Rule),
                     cause,
                     rerun: true,
                     interrupted: true,

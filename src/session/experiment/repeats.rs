@@ -9,7 +9,7 @@ use super::{Experiment, ExperimentState};
 use crate::optimize::study::{Outcome, StudyError, TellOutcome};
 use crate::session::objective;
 use crate::telemetry::TrialSpec;
-use crate::trial::{Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
+use crate::trial::{JudgedBy, Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
 
 impl Experiment {
     /// Returns the proposal of the trial's next rollout.
@@ -53,18 +53,21 @@ impl Experiment {
     ) -> Result<Option<f64>, RequestRefusal> {
         let wanted = self.plan.control.repeats;
         let Some(row) = self.rows.get_mut(&trial) else { return not_now("no trial is under review") };
-        let TrialRecord { verdict, value, cause, measured, .. } = row.clone();
-        row.repeats.push(RepeatRecord { seed, verdict, value, cause, measured });
+        let TrialRecord { verdict, judged_by, value, cause, measured, .. } = row.clone();
+        row.repeats.push(RepeatRecord { seed, verdict, judged_by, value, cause, measured });
         if row.counted_repeats() >= wanted {
             let judged = row.repeats.iter().filter_map(|repeat| Some((repeat.verdict?, repeat.value)));
             let counted: Vec<_> = judged.filter(|(verdict, _)| *verdict != Verdict::Void).collect();
             let (verdict, mean, cause) = objective::judge_repeats(&counted);
             (row.verdict, row.suggested, row.value, row.cause) = (Some(verdict), Some(verdict), mean, cause);
+            // A rollout of an earlier version has no origin of its verdict.
+            let operators = row.repeats.iter().any(|repeat| repeat.judged_by == Some(JudgedBy::Operator));
+            row.judged_by = if operators { Some(JudgedBy::Operator) } else { judged_by };
             return Ok(mean);
         }
         let repeats = row.repeats.clone();
         (row.verdict, row.suggested, row.value, row.hand_value, row.measured) = (None, None, None, None, None);
-        row.cause = String::new();
+        (row.judged_by, row.cause) = (None, String::new());
         if let Err(error) = self.study.annotate(trial, &attributes::write(&RepeatsAttribute { repeats: &repeats })) {
             self.rows.insert(trial, suggestion);
             return match error {
@@ -108,7 +111,8 @@ impl Experiment {
     pub(super) fn give_up(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
         let cause = "given up between its repeats".to_owned();
-        let void = TrialRecord { verdict: Some(Verdict::Void), cause, ..row.clone() };
+        let judged_by = Some(JudgedBy::Operator);
+        let void = TrialRecord { verdict: Some(Verdict::Void), judged_by, cause, ..row.clone() };
         let judged = attributes::write(&JudgedAttributes::of(&void, false));
         let told = self.study.tell_if(trial, Outcome::Fail, &judged, &|_| true)?;
         self.state = ExperimentState::Finished;

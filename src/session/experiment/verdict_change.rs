@@ -6,7 +6,7 @@ use super::Experiment;
 use super::judging::value_of;
 use super::plan::{RequestRefusal, not_now};
 use crate::optimize::trial::VerdictChange;
-use crate::trial::{CHANGED, Verdict};
+use crate::trial::{CHANGED, JudgedBy, Verdict};
 
 impl Experiment {
     /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
@@ -50,7 +50,8 @@ impl Experiment {
         };
         self.study.change_verdict(trial, &change)?;
         if let Some(row) = self.rows.get_mut(&trial) {
-            (row.verdict, row.value, row.cause) = (Some(verdict), value, cause);
+            (row.verdict, row.judged_by) = (Some(verdict), Some(JudgedBy::Operator));
+            (row.value, row.cause) = (value, cause);
         }
         self.publish_row(trial);
         self.propose()?;

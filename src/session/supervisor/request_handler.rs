@@ -25,7 +25,7 @@ impl Supervisor {
             request => {
                 let request = request.clone();
                 self.give(JobPurpose::Request(stamped.clone(), asker), time_ns, move |experiment| {
-                    study_requests::carry_out(experiment, &request)
+                    study_requests::carry_out(experiment, &request, asker)
                 });
                 None
             }

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use super::unfinished::Asker;
 use crate::session::experiment::{Experiment, RequestRefusal};
 use crate::session::operator_request::{OperatorRequest, counted};
 use crate::session::storage::JobOutput;
 use crate::trial::{ExperimentStage, FixedParameter, Verdict, four_digits, parameter_unit, six_digits};
 
-/// Carries out a request. One that is not of the study is refused.
-pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest) -> JobOutput {
+/// Carries out a request of `asker`. One that is not of the study is refused.
+pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest, asker: Asker) -> JobOutput {
     let before = Before::of(experiment, request);
     let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
     let again = format!("{trial} is void, and its parameters are proposed again");

@@ -321,6 +321,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         cause: if suggested == Some(Verdict::Fall) { "roll 1.200 rad exceeds 1.000 rad" } else { "landed and settled" }
             .into(),
         verdict,
+        judged_by: None,
         note: String::new(),
         risk: None,
         expected: None,
