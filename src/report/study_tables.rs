@@ -237,9 +237,11 @@ pub fn trials(study: &ReportedStudy) -> Table {
         Column::number("rise", "m"),
         Column::number("air", "s"),
         Column::text("verdict"),
-        Column::text("source"),
     ]);
+    // A study of an earlier version has no origins of its verdicts.
+    let origins = study.rows.iter().any(|row| row.judged_by.is_some());
     let known = !study.recordings.files.is_empty();
+    let columns = columns.chain(origins.then(|| Column::text("judged by"))).chain([Column::text("source")]);
     let columns = columns.chain(known.then(|| Column::text("ticks")));
     let mut table = Table::new(format!("Trials of {}.", title(study)), columns);
     for row in &study.rows {
@@ -252,8 +254,9 @@ pub fn trials(study: &ReportedStudy) -> Table {
         let expected = expected.into_iter().zip([3, 2]).filter(|_| expects);
         let cells = cells.chain(expected.map(|(value, digits)| Cell::optional(value, digits)));
         let cells = cells.chain([Cell::optional(row.value, 3)]).chain(measured(row));
-        let texts = [Cell::text(verdict), Cell::text(row.origin())];
-        table.rows.push(cells.chain(texts).chain(known.then(|| Cell::text(study.ticks_of(row.trial)))).collect());
+        let judged_by = origins.then(|| row.judged_by.map_or(Cell::Missing, |by| Cell::text(by.name())));
+        let cells = cells.chain([Cell::text(verdict)]).chain(judged_by).chain([Cell::text(row.origin())]);
+        table.rows.push(cells.chain(known.then(|| Cell::text(study.ticks_of(row.trial)))).collect());
     }
     table
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
-use crate::trial::{JumpRow, ParameterInfo, ParameterValues, TrialRecord, Verdict};
+use crate::trial::{JudgedBy, JumpRow, ParameterInfo, ParameterValues, TrialRecord, Verdict};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
@@ -56,6 +56,28 @@ fn verdict(row: &TrialRecord) -> String {
     let explained = row.verdict != Some(Verdict::Accept) || row.is_overruled();
     let cause = if explained && !row.cause.is_empty() { format!(": {}", row.cause) } else { String::new() };
     format!("{name}{by_hand}{cause}")
+}
+
+/// The origins of the verdicts as a line, `Judged by the operator: trials 0 to 2, 4; by a rule of the program: trial 3`; empty where no
+/// verdict has one.
+pub fn origins(rows: &[TrialRecord]) -> String {
+    let of = |by: JudgedBy, words: &str| {
+        let trials: Vec<u32> = rows.iter().filter(|row| row.judged_by == Some(by)).map(|row| row.trial).collect();
+        let plural = if trials.len() == 1 { "" } else { "s" };
+        (!trials.is_empty()).then(|| format!("by {words}: trial{plural} {}", ranges(&trials)))
+    };
+    let origins = [of(JudgedBy::Operator, "the operator"), of(JudgedBy::Rule, "a rule of the program")];
+    let origins: Vec<String> = origins.into_iter().flatten().collect();
+    if origins.is_empty() { String::new() } else { format!("Judged {}\n", origins.join("; ")) }
+}
+
+/// Ascending numbers in words, three or more in a row by the first and the last: `0 to 2, 4, 5`.
+fn ranges(numbers: &[u32]) -> String {
+    let runs = numbers.chunk_by(|a, b| *b == a + 1).map(|run| match run {
+        [first, .., last] if run.len() > 2 => format!("{first} to {last}"),
+        run => run.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
+    });
+    runs.collect::<Vec<_>>().join(", ")
 }
 
 /// The trials of a study of another program as an aligned table, with parameters of every kind; the trial of number `best`

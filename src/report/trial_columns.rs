@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::columns::{Cells, TypedColumn};
 use crate::optimize::exchange::{ATTRIBUTE, PARAMETER, SYSTEM_ATTRIBUTE};
 use crate::optimize::trial::Trial;
+use crate::trial::{JudgedBy, is_changed_verdict};
 
 /// Returns the columns of the trials. `metric` is the name of the objective, empty where the study has none; `note` returns
 /// the note of a trial by its number.
@@ -25,12 +26,21 @@ pub fn of(trials: &[Trial], metric: &str, note: impl Fn(u32) -> String) -> Vec<T
     ];
     let parameters = |trial: &Trial| trial.external_parameters().into_iter().collect();
     columns.extend(nested(PARAMETER, trials, parameters));
-    columns.extend(nested(ATTRIBUTE, trials, |trial| trial.user_attributes.clone()));
+    columns.extend(nested(ATTRIBUTE, trials, attributes));
     columns.extend(nested(SYSTEM_ATTRIBUTE, trials, |trial| trial.system_attributes.clone()));
     let states = trials.iter().map(|trial| <&str>::from(trial.state)).collect();
     columns.push(TypedColumn::new("state", Cells::Name(states)));
     columns.push(TypedColumn::new("note", Cells::Text(trials.iter().map(|trial| note(trial.number)).collect())));
     columns
+}
+
+/// Returns the user attributes of a trial. A changed verdict is the operator's: the change holds state, value, verdict and cause alone.
+fn attributes(trial: &Trial) -> BTreeMap<String, Value> {
+    let mut attributes = trial.user_attributes.clone();
+    if attributes.get("cause").and_then(Value::as_str).is_some_and(is_changed_verdict) {
+        attributes.insert("judged_by".to_owned(), JudgedBy::Operator.name().into());
+    }
+    attributes
 }
 
 fn numbers(name: String, cells: impl Iterator<Item = Option<f64>>) -> TypedColumn {

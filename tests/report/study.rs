@@ -7,11 +7,12 @@ use quadfrog::recording::writer::Writer;
 use quadfrog::report::jump::{JumpCurves, JumpQuantities, force_angle_rad};
 use quadfrog::report::recorded::{RecordedTrial, Recordings};
 use quadfrog::report::study::{ReportedStudy, TrialChoice, mean_and_deviation, mean_best_so_far};
-use quadfrog::report::{study_page, text};
+use quadfrog::report::{study_page, table, text};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Tick;
 use quadfrog::trial::{
-    Approval, JumpParameters, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task, TrialRecord, Verdict,
+    Approval, JudgedBy, JumpParameters, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task, TrialRecord,
+    Verdict,
 };
 
 /// Ticks from -0.2 s: on the ground until 0.3 s but for a lift of 5 ms at 0.1 s, in the air until 0.8 s, then landed.
@@ -151,6 +152,18 @@ fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {
         let (trials, counted) = (6 * studies.len(), 4 * studies.len());
         assert!(results.contains(&format!("{trials} trials, {counted} counted")), "{results}");
     }
+}
+
+#[test]
+fn the_origins_of_verdicts_are_a_line_of_ranges() {
+    let judged = |trial: u32, judged_by| TrialRecord { judged_by, ..row(trial, Verdict::Accept, 0.5) };
+    let (operator, rule) = (Some(JudgedBy::Operator), Some(JudgedBy::Rule));
+    let by = [operator, operator, operator, rule, operator, operator, None, rule, operator];
+    let rows: Vec<TrialRecord> = (0..).zip(by).map(|(trial, by)| judged(trial, by)).collect();
+    let line = "Judged by the operator: trials 0 to 2, 4, 5, 8; by a rule of the program: trials 3, 7\n";
+    assert_eq!(table::origins(&rows), line);
+    assert_eq!(table::origins(&rows[3..4]), "Judged by a rule of the program: trial 3\n");
+    assert_eq!(table::origins(&rows[6..7]), "", "of an earlier version");
 }
 
 #[test]

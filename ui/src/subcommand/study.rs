@@ -242,6 +242,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         Some(_) => table::table(&rows, best, parameters, unit),
         None => table::other_program(study.trials(), best),
     };
+    text += &table::origins(&rows);
     let not_run = rows.iter().filter(|row| row.was_not_run()).count();
     if not_run > 0 {
         let proposals = counted(not_run as u32, "proposal");
