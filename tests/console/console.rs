@@ -29,6 +29,7 @@ mod first_user;
 mod graphics;
 mod guard;
 mod health_view;
+mod judged_by;
 mod judging;
 mod keys;
 mod live_view;

@@ -4,7 +4,7 @@ use quadfrog::optimize::ask::Direction;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::ReportedStudy;
 use quadfrog::report::{study_page, text};
-use quadfrog::trial::{Displacement, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{Displacement, JudgedBy, TrialRecord, Verdict, six_digits};
 
 use crate::column::Column;
 use crate::message::ExportedRows;
@@ -74,7 +74,7 @@ pub fn as_text(trial: &TrialRecord, model: &Model) -> String {
 fn export_cells(model: &Model, rows: ExportedRows, write: fn(f64) -> String) -> (Vec<String>, Vec<Vec<String>>) {
     let mut names = vec!["trial".to_owned()];
     names.extend(model.session.info.parameters.iter().map(|info| info.name.clone()));
-    let rest = ["value", "hand_value", "verdict", "suggested", "cause", "source", "parent", "attempt"];
+    let rest = ["value", "hand_value", "verdict", "judged_by", "suggested", "cause", "source", "parent", "attempt"];
     names.extend(rest.map(str::to_owned));
     names.extend(["dx_m", "dy_m", "dyaw_rad", "apex_m", "air_s", "note"].map(str::to_owned));
     names.extend(["flights", "touchdown_dx_m", "touchdown_dy_m", "touchdown_dyaw_rad", "jumps"].map(str::to_owned));
@@ -86,6 +86,7 @@ fn export_cells(model: &Model, rows: ExportedRows, write: fn(f64) -> String) -> 
             optional(trial.value),
             optional(trial.hand_value),
             trial.verdict_name().unwrap_or("").to_owned(),
+            trial.judged_by.map_or("", JudgedBy::name).to_owned(),
             trial.suggested.map_or("", Verdict::name).to_owned(),
             trial.cause.clone(),
             trial.source.name().to_owned(),

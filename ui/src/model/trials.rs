@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use quadfrog::optimize::ask::Direction;
 use quadfrog::optimize::repeats::{RepeatResult, contenders_of, improvements, least_repeats, points_of};
-use quadfrog::trial::{ParameterInfo, PointRecord, PredictedTrial, TrialRecord, Verdict};
+use quadfrog::trial::{JudgedBy, ParameterInfo, PointRecord, PredictedTrial, TrialRecord, Verdict};
 
 use crate::column::Column;
 
@@ -181,6 +181,7 @@ impl TrialTable {
         rows.sort_by(|a, b| match self.sort {
             SortBy::Number => a.trial.cmp(&b.trial),
             SortBy::Column(Column::Verdict) => verdict_rank(a.verdict).cmp(&verdict_rank(b.verdict)),
+            SortBy::Column(Column::JudgedBy) => judged_rank(a).cmp(&judged_rank(b)),
             SortBy::Column(Column::Source | Column::Parameters) => a.source.name().cmp(b.source.name()),
             SortBy::Column(Column::Cause) => a.cause.cmp(&b.cause),
             _ => descending(sort_value(a), sort_value(b)),
@@ -188,6 +189,7 @@ impl TrialTable {
         if self.reversed {
             // Rows without a value to sort by stay last.
             let sorted = match self.sort {
+                SortBy::Column(Column::JudgedBy) => rows.iter().take_while(|row| row.judged_by.is_some()).count(),
                 SortBy::Column(Column::Verdict) => rows.iter().take_while(|row| row.verdict.is_some()).count(),
                 SortBy::Number | SortBy::Column(Column::Source | Column::Parameters | Column::Cause) => rows.len(),
                 _ => rows.iter().take_while(|row| sort_value(row).is_some()).count(),
@@ -209,6 +211,12 @@ fn descending(a: Option<f64>, b: Option<f64>) -> Ordering {
 /// The order of verdicts: accept, fall, void, none yet.
 fn verdict_rank(verdict: Option<Verdict>) -> usize {
     verdict.and_then(|verdict| Verdict::ALL.iter().position(|v| *v == verdict)).unwrap_or(Verdict::ALL.len())
+}
+
+/// The order of the origins of verdicts: operator, rule, none.
+fn judged_rank(trial: &TrialRecord) -> usize {
+    let place = trial.judged_by.and_then(|by| JudgedBy::ALL.iter().position(|known| *known == by));
+    place.unwrap_or(JudgedBy::ALL.len())
 }
 
 /// Share of falls among the nearest trials before it ran.

@@ -1,7 +1,9 @@
 //! All details of one trial, for their dialog.
 
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
-use quadfrog::trial::{Displacement, ExpectedResult, JumpRow, Overrides, TrialRecord, four_digits, six_digits};
+use quadfrog::trial::{
+    Displacement, ExpectedResult, JudgedBy, JumpRow, Overrides, TrialRecord, four_digits, six_digits,
+};
 
 use super::draw::{clock, falls_near};
 use super::points;
@@ -21,8 +23,15 @@ pub fn details(
     let unit = &session.info.unit;
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
-    let verdict = trial.verdict_name().unwrap_or("not judged").to_owned();
-    row("verdict", verdict);
+    let verdict = trial.verdict_name().unwrap_or("not judged");
+    let by = match trial.judged_by {
+        // The cause says it.
+        Some(JudgedBy::Operator) if trial.operators_reason().is_some() => "",
+        Some(JudgedBy::Operator) => ", by the operator",
+        Some(JudgedBy::Rule) => ", by a rule of the program",
+        None => "",
+    };
+    row("verdict", verdict.to_owned() + by);
     if let Some(suggested) = trial.suggested {
         row("suggested", suggested.name().to_owned());
     }

@@ -1,6 +1,6 @@
 //! View 2, Trials: the whole table. Its newest rows are the lower part of Live.
 
-use quadfrog::trial::{TrialRecord, Verdict};
+use quadfrog::trial::{JudgedBy, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Style;
@@ -136,6 +136,7 @@ fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
             Column::Air => (format!("{:>7}", "air s"), 7),
             Column::Value => (format!("{:>8}", format!("J {}", model.session.info.unit)), 9),
             Column::Verdict => ("  verdict".to_owned(), 10),
+            Column::JudgedBy => ("judged by".to_owned(), 9),
             Column::Source => ("source".to_owned(), source_width(model)),
             Column::Risk => ("fell".to_owned(), 4),
             Column::Time => ("   ran".to_owned(), 7),
@@ -151,6 +152,15 @@ fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
         let columns = new.map(|(title, cell)| ShownColumn { title, width: 9, cell });
         shown.splice(at..at, columns);
     }
+    // The origin of the verdict gives way where the cause would be cut, and in a study of an earlier version, which has none.
+    let judged = || model.session.trials.records.values().filter(|row| row.verdict.is_some() && !row.was_not_run());
+    let origins = judged().count() == 0 || judged().any(|row| row.judged_by.is_some());
+    let of_fixed_width: usize = shown.iter().filter(|c| c.width < usize::MAX).map(|c| c.width + 1).sum();
+    let cause = shown.iter().any(|column| column.width == usize::MAX);
+    let needed = NUMBER_WIDTH + of_fixed_width + if cause { LEAST_CAUSE } else { 0 };
+    if !origins || needed > width {
+        shown.retain(|column| !matches!(column.cell, CellContent::Of(Column::JudgedBy)));
+    }
     let mut left = width.saturating_sub(NUMBER_WIDTH);
     for column in &mut shown {
         column.width = column.width.min(left);
@@ -162,6 +172,9 @@ fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn> {
 
 /// Width of the trial's number and the space behind it.
 const NUMBER_WIDTH: usize = 5;
+
+/// Characters of note and cause beside the origin of the verdict at least.
+const LEAST_CAUSE: usize = 60;
 
 /// The table, scrolled so that the selected row is seen. `full` shows the choice; without it the rows around the newest trial.
 pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
@@ -300,6 +313,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             };
             (format!("{symbol} {verdict:<7}{}", if best { "*" } else { " " }), role)
         }
+        Column::JudgedBy => (trial.judged_by.map_or("", JudgedBy::name).to_owned(), Role::Quiet),
         Column::Source => (trial.origin(), Role::Quiet),
         Column::Risk => {
             let risk = trial.risk.filter(|risk| risk.neighbours > 0);
