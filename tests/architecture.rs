@@ -1,4 +1,5 @@
-//! Rules of the source tree: dependencies of the modules, import cycles, unique type names, file lengths, cited paths.
+//! Rules of the source tree: dependencies of the modules, import cycles, unique type names, file lengths, cited paths, sources
+//! without a target.
 //!
 //! The sources are read as tokens: comments and texts are no code, code in macros is. Test modules are left out.
 
@@ -420,6 +421,54 @@ fn no_source_of_a_library_has_a_test() {
             "{manifest}: [lib] has no `test = false`"
         );
     }
+}
+
+/// Adds the file of a module and those of its modules (`mod name;`, with or without `#[path]`). `owns_folder`: its modules are
+/// beside it, as those of a root, of a `mod.rs` and of a file named by `#[path]`.
+fn add_modules(file: &Path, owns_folder: bool, found: &mut BTreeSet<PathBuf>) {
+    let file = file.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    let text = fs::read_to_string(&file).unwrap();
+    let folder = if owns_folder { file.parent().unwrap().to_owned() } else { file.with_extension("") };
+    let mut named = None;
+    for line in text.lines().map(str::trim) {
+        if let Some(path) = line.strip_prefix("#[path = \"").and_then(|rest| rest.strip_suffix("\"]")) {
+            named = Some(file.with_file_name(path));
+        }
+        let Some((before, name)) = line.strip_suffix(';').and_then(|line| line.split_once("mod ")) else { continue };
+        if before.is_empty() || before.starts_with("pub") {
+            let [beside, below] = [folder.join(format!("{name}.rs")), folder.join(name).join("mod.rs")];
+            match named.take() {
+                Some(path) => add_modules(&path, true, found),
+                None if beside.exists() => add_modules(&beside, false, found),
+                None => add_modules(&below, true, found),
+            }
+        }
+    }
+    found.insert(file);
+}
+
+/// A file that no target includes is neither compiled nor run. Roots are those that cargo finds by itself, and those of the manifests.
+#[test]
+fn every_source_of_tests_benches_and_examples_belongs_to_a_target() {
+    let folders = ["tests", "benches", "examples", "ui/benches"];
+    let sources: Vec<PathBuf> = folders.iter().flat_map(|folder| files(&root().join(folder), "rs")).collect();
+    let is_folder = |folder: Option<&Path>| folders.iter().any(|known| folder == Some(&root().join(known)));
+    let is_found = |file: &PathBuf| {
+        is_folder(file.parent()) || file.ends_with("main.rs") && is_folder(file.parent().unwrap().parent())
+    };
+    let mut roots: Vec<PathBuf> = sources.iter().filter(|file| is_found(file)).cloned().collect();
+    for package in ["", "ui"] {
+        let folder = root().join(package);
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        assert!(!manifest.contains("\nauto"), "{package}: cargo finds no target by itself");
+        let paths = manifest.lines().filter_map(|line| line.strip_prefix("path = \"")?.strip_suffix('"'));
+        roots.extend(paths.filter(|path| !path.starts_with("src/")).map(|path| folder.join(path)));
+    }
+    let mut compiled = BTreeSet::new();
+    roots.iter().for_each(|file| add_modules(file, true, &mut compiled));
+    let is_lost = |file: &&PathBuf| !compiled.contains(&file.canonicalize().unwrap());
+    let lost: Vec<String> = sources.iter().filter(is_lost).map(|file| short(file)).collect();
+    assert_none(&lost, "Name it with `mod` in a file of a target, or as `path` of a [[test]] in ui/Cargo.toml.");
 }
 
 #[test]

@@ -38,12 +38,12 @@ const LONGEST: Duration = Duration::from_secs(5);
 
 /// The player may hold one chunk of the largest size that it accepts, packed and unpacked.
 const TARGETS: [Target; 6] = [
-    Target { name: "packets", run: targets::packets, corpus: corpus::packets, memory: MB, few: 50_000 },
-    Target { name: "journal", run: targets::journal, corpus: corpus::journal, memory: 16 * MB, few: 20_000 },
-    Target { name: "player", run: targets::player, corpus: corpus::player, memory: 600 * MB, few: 1_500 },
-    Target { name: "urdf", run: targets::urdf, corpus: corpus::urdf, memory: 64 * MB, few: 1_000 },
-    Target { name: "config", run: targets::config, corpus: corpus::config, memory: 64 * MB, few: 1_500 },
-    Target { name: "keys", run: targets::keys, corpus: corpus::keys, memory: 16 * MB, few: 50_000 },
+    Target { name: "packets", run: targets::packets, corpus: corpus::packets, memory: MB, few: 20_000 },
+    Target { name: "journal", run: targets::journal, corpus: corpus::journal, memory: 16 * MB, few: 10_000 },
+    Target { name: "player", run: targets::player, corpus: corpus::player, memory: 600 * MB, few: 700 },
+    Target { name: "urdf", run: targets::urdf, corpus: corpus::urdf, memory: 64 * MB, few: 500 },
+    Target { name: "config", run: targets::config, corpus: corpus::config, memory: 64 * MB, few: 700 },
+    Target { name: "keys", run: targets::keys, corpus: corpus::keys, memory: 16 * MB, few: 20_000 },
 ];
 
 /// Most memory and processor time over all inputs of a run, and the whole time.
