@@ -120,8 +120,12 @@ impl Container {
         }
         let footer_at = bytes - magic - FOOTER_BYTES;
         let footer = self.read_at(footer_at, FOOTER_BYTES)?;
-        let Record::Footer(footer) = mcap::parse_record(footer[0], &footer[RECORD_HEAD as usize..])? else {
+        // The opcode is checked first: the text of another record would be allocated by its length.
+        if footer[0] != op::FOOTER {
             return Ok(false);
+        }
+        let Record::Footer(footer) = mcap::parse_record(op::FOOTER, &footer[RECORD_HEAD as usize..])? else {
+            unreachable!("parsed by its opcode");
         };
         // Without a checksum nothing tells a damaged index: the scan finds the chunks themselves.
         if footer.summary_start == 0 || footer.summary_start > footer_at || footer.summary_crc == 0 {

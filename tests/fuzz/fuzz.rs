@@ -149,6 +149,22 @@ fn a_damaged_length_in_the_head_of_a_chunk_is_not_allocated() {
     targets::clean();
 }
 
+/// Regression: the record in the place of the footer was parsed whatever its opcode, so that another one's text with a length of
+/// 1 GB was allocated by every reader.
+#[test]
+fn another_record_in_the_place_of_the_footer_is_not_allocated() {
+    for mut damaged in corpus::player() {
+        let magic_at = damaged.len() - 8;
+        let footer_at = magic_at - 29;
+        // An index of metadata: offset, length, and a name of 1 GB.
+        damaged[footer_at] = 13;
+        damaged[magic_at - 4..magic_at].copy_from_slice(&(1_u32 << 30).to_le_bytes());
+        let ((), memory) = count_alloc::most_memory(|| targets::player(&damaged));
+        assert!(memory < 16 * MB, "{memory} bytes");
+    }
+    targets::clean();
+}
+
 /// Tests the runner: a panic, endless memory and endless work are each found, with an input that repeats.
 #[test]
 fn a_fault_of_a_target_is_found_and_repeats_by_its_number() {
