@@ -86,7 +86,7 @@ fn a_fault_in_the_air_that_leaves_the_state_known_is_landed_by_the_controller() 
     for (name, model) in MODELS {
         for (fault, inject, words) in faults {
             for time_s in IN_THE_AIR {
-                let mut bench = emulated(model).reach(Mode::Jump);
+                let mut bench = emulated(model).with_short_countdown().reach(Mode::Jump);
                 bench.until_trial_time(time_s);
                 bench.events.clear();
                 inject(&mut bench);
@@ -110,7 +110,7 @@ fn a_fault_in_the_air_that_leaves_the_state_known_is_landed_by_the_controller() 
 fn a_fault_in_the_air_that_leaves_the_state_unknown_is_landed_by_the_motors() {
     for (name, model) in MODELS {
         for time_s in IN_THE_AIR {
-            let mut bench = emulated(model).reach(Mode::Jump);
+            let mut bench = emulated(model).with_short_countdown().reach(Mode::Jump);
             bench.until_trial_time(time_s);
             bench.robot.deaf_ms = 1;
             bench.ticks(21);
@@ -130,7 +130,7 @@ fn a_fault_in_the_air_that_leaves_the_state_unknown_is_landed_by_the_motors() {
 /// A frozen computer of the robot executes no command; the controller tries nevertheless, and latches the fault.
 #[test]
 fn a_robot_that_freezes_in_the_air_is_latched_as_a_fault() {
-    let mut bench = emulated(|_| {}).reach(Mode::Jump);
+    let mut bench = emulated(|_| {}).with_short_countdown().reach(Mode::Jump);
     bench.until_trial_time(0.42);
     bench.inject("freeze");
     let ms = bench.ticks_in_mode(Mode::Jump, 1000);
@@ -143,7 +143,7 @@ fn a_robot_that_freezes_in_the_air_is_latched_as_a_fault() {
 fn a_landing_without_a_state_is_damped() {
     for (name, model) in MODELS {
         for after_ms in [5, 30, 100] {
-            let mut bench = emulated(model).reach(Mode::Settle);
+            let mut bench = emulated(model).with_short_countdown().reach(Mode::Settle);
             bench.ticks(after_ms);
             bench.robot.deaf_ms = 1;
             let ms = bench.ticks_in_mode(Mode::Settle, 100);
@@ -168,7 +168,7 @@ fn a_fault_of_a_motor_and_stop_damp_at_once() {
         for fault in
             ["angle FL_hip 1.3", "speed RR_thigh 90", "torque RR_calf 50", "servo-off RL_thigh", "nan FL_calf", "stop"]
         {
-            let mut bench = emulated(|_| {}).reach(Mode::Jump);
+            let mut bench = emulated(|_| {}).with_short_countdown().reach(Mode::Jump);
             bench.until_trial_time(0.42);
             if landing {
                 bench.inject("hot FR_calf 80");
@@ -191,7 +191,7 @@ fn a_fault_of_a_motor_and_stop_damp_at_once() {
 /// A series of jumps ends with the jump in which a fault was found.
 #[test]
 fn a_fault_ends_a_series_of_jumps() {
-    let mut bench = emulated(|_| {}).reach(Mode::Ready);
+    let mut bench = emulated(|_| {}).with_short_countdown().reach(Mode::Ready);
     bench.settle();
     let mut spec = bench.spec();
     (spec.jumps, spec.jump.f1_hz, spec.jump.fx_n) = (5, 0.5, 20.0);

@@ -145,14 +145,12 @@ fn a_sound_robot_is_ready() {
             bench.command(Command::RunTrial(spec, bench.permit()));
             bench.end_of_countdown(1);
             assert_eq!(bench.cycle.mode(), Mode::Countdown, "{gains:?}: {:?}", bench.refusal());
+            let (cycle, mode_changes) = (bench.cycle, bench.mode_changes);
             bench.ticks(1);
             assert_eq!(bench.tick(None).mode, Mode::Jump, "{gains:?}: {:?}", bench.events.last());
-            bench.stop(None);
-            bench.robot.emulator.apply("place".parse().unwrap());
-            bench.ticks(1500);
-            bench.command(Command::Acknowledge { stops: 0 });
-            bench.ticks(1500);
-            bench.command(bench.arm());
+            // The impulse has moved nothing in its first tick: from before it the same robot is ready for the next corner.
+            (bench.cycle, bench.mode_changes) = (cycle, mode_changes);
+            bench.command(Command::Cancel);
             bench.until(Mode::Ready);
         }
     }
