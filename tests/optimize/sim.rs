@@ -124,6 +124,36 @@ fn a_right_simulator_finds_the_best_jump_within_five() {
     assert!(best > 0.9 * BEST && best > gp && falls <= 5, "{best} {falls} {gp}");
 }
 
+/// Worlds that jump farther also slip later. Three jumps that stand say by their values alone whether the robot slips early.
+#[test]
+fn values_tell_where_the_robot_stands() {
+    let world = |k: f64| Formula { gain: 0.7 + 0.2 * k, best: 0.55, grip: 0.35 + 0.1 * k };
+    let simulated = prior_of(&[0.0, 1.0, 2.0, 3.0].map(world), 96);
+    // Without the reserve of friction, which alone separates stood and fallen in the formula.
+    let simulated = Prior::new(simulated.parameters, simulated.points, simulated.worlds, None);
+    let prior = Arc::new(PriorModel::new(simulated));
+    let p_stand = |robot: Formula| {
+        let mut study = study_with(&prior, 0);
+        for u in [[0.55, 0.0, 0.6], [0.55, 0.4, 0.8], [0.55, 0.75, 1.0]] {
+            let given: Vec<_> = study
+                .options()
+                .space
+                .parameters()
+                .iter()
+                .zip(u)
+                .map(|(p, u)| (p.name.clone(), p.range.unscale(u)))
+                .collect();
+            let number = study.begin(&study.draft_with(&given), &[], &[]).unwrap();
+            finish(&mut study, number, Some(robot.jump(&u).expect("within the least grip")));
+        }
+        // Ratio of forces 0.5, between the grips of the second and the third world.
+        expected_at(&study, &[0.55, 0.9, 0.6]).p_stand
+    };
+    let (weak, strong) = (p_stand(world(0.0)), p_stand(world(3.0)));
+    println!("P(stand) of a robot like the weakest world {weak:.3}, like the strongest {strong:.3}");
+    assert!(strong - weak > 0.2, "{weak} {strong}");
+}
+
 /// After 10 jumps within 10 % of `gp`, whose first points are free of the simulator.
 #[test]
 fn a_mirrored_simulator_is_left_for_the_values_that_contradict_it() {
@@ -200,8 +230,8 @@ fn a_prior_file_keeps_the_hyperparameters_and_the_bits() {
     assert_eq!(read, prior);
     let (fitted, again) = (PriorModel::new(prior_of(&WORLDS, 64)), PriorModel::new(read));
     let bits = |model: &PriorModel| -> Vec<u64> {
-        let Features { value, standing } = model.features(&[0.3, 0.7, 0.2]).unwrap();
-        value.iter().chain(&standing).map(|x| x.to_bits()).collect()
+        let Features { value, standing, labels } = model.features(&[0.3, 0.7, 0.2]).unwrap();
+        value.iter().chain(&standing).chain(&labels).map(|x| x.to_bits()).collect()
     };
     assert_eq!(bits(&fitted), bits(&again));
 }

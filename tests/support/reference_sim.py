@@ -114,6 +114,19 @@ class Ensemble:
         standing = [one, g.mean(0), reserve(x), *(self.b.T @ (g - g.mean(0)))]
         return np.stack(value, 1), np.stack(standing, 1)
 
+    def shares(self, point, stood, y):
+        """Share of each world in the label: 0.3 / n, and 0.7 by the root of its likelihood."""
+        v, g = self.raw(point)
+        b0, b1, b2 = self.mean
+        p = np.clip(1 / (1 + np.exp(-(b0 + b1 * g + b2 * reserve(point)))), 0.0, 1.0)
+        labels = np.log(np.maximum(np.where(stood, p, 1 - p), 0.02)).sum(1)
+        n, x = stood.sum(), point[stood]
+        covariance = np.exp(-2) * matern(x, x, np.full(2, np.exp(-0.35))) + 0.25 + np.exp(-6) * np.eye(n)
+        residual = y - (v[:, stood] - self.offset) / self.scale
+        fit = -0.5 * (residual @ np.linalg.inv(covariance) * residual).sum(1)
+        likelihood = np.exp(labels + fit - (labels + fit).max())
+        return 0.3 / len(v) + 0.7 * np.sqrt(likelihood) / np.sqrt(likelihood).sum()
+
 
 def predict(ensemble, trials, x):
     point = np.array([t["unit"] for t in trials])
@@ -121,6 +134,8 @@ def predict(ensemble, trials, x):
     y = (np.array([t["value"] for t in trials])[stood] - ensemble.offset) / ensemble.scale
     h, c = ensemble.terms(point)
     hx, cx = ensemble.terms(x)
+    shares = ensemble.shares(point, stood, y)
+    c[:, 1], cx[:, 1] = shares @ ensemble.raw(point)[1], shares @ ensemble.raw(x)[1]
     # value
     r = ensemble.a.shape[1]
     mean, variance = np.array([0, 1.0] + [0] * r), np.array([0.25, 0.09] + [2.0 / r] * r)

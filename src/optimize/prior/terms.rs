@@ -30,6 +30,8 @@ pub struct Features {
     pub value: Vec<f64>,
     /// 1, mean label, reserve of friction, components: of standing.
     pub standing: Vec<f64>,
+    /// Clipped label of each world.
+    pub labels: Vec<f64>,
 }
 
 /// The worlds' surfaces and what they have in common.
@@ -111,6 +113,11 @@ impl Ensemble {
         self.labels.at(x).into_iter().map(clipped).collect()
     }
 
+    /// Number of worlds.
+    pub fn worlds(&self) -> usize {
+        self.label_components.nrows()
+    }
+
     /// Number of components of value and label.
     pub fn components(&self) -> (usize, usize) {
         (self.value_components.ncols(), self.label_components.ncols())
@@ -128,7 +135,7 @@ impl Ensemble {
         value.extend(project(&self.value_components, values, m, self.scale));
         let mut standing = vec![1.0, g, reserve];
         standing.extend(project(&self.label_components, labels, g, 1.0));
-        Features { value, standing }
+        Features { value, standing, labels: labels.to_vec() }
     }
 }
 

@@ -2,17 +2,13 @@
 
 use super::history::History;
 use super::model::ValueModel;
-use super::safeguard;
+use super::{safeguard, worlds};
 use crate::optimize::ask::Direction;
-use crate::optimize::gp::laplace::sigmoid;
 use crate::optimize::prior::PriorModel;
 use crate::optimize::prior::terms::Ensemble;
 use crate::optimize::trial::Trial;
-use libm::{exp, log, sqrt};
+use libm::sqrt;
 use serde::{Deserialize, Serialize};
-
-/// Least probability of a label under a world: a single label does not rule a world out.
-const LEAST_PROBABILITY: f64 = 0.02;
 
 /// Mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,35 +65,9 @@ pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Op
     })
 }
 
-/// Likelihood of values and labels under each world, its value with the robot's bias and difference, its label through the logistic
-/// prior. A world without a value explains no jump that stood.
+/// The likelihood of each world with its name.
 fn weights(prior: &PriorModel, ensemble: &Ensemble, history: &History) -> Vec<WorldWeight> {
-    let [b0, b1, b2] = ensemble.standing.mean;
-    let any_stood = history.stood().next().is_some();
-    let log_likelihood = |k: usize| {
-        let labels = history.jumps.iter().map(|jump| {
-            let label = ensemble.world_labels(&jump.point)[k];
-            let p = sigmoid(b0 + b1 * label + b2 * jump.features.standing[2]);
-            log(if jump.stood { p } else { 1.0 - p }.max(LEAST_PROBABILITY))
-        });
-        let values = match ensemble.known.iter().position(|known| *known == k) {
-            Some(at) => {
-                let simulated = |x: &[f64]| (ensemble.world_values(x)[at] - ensemble.offset) / ensemble.scale;
-                ValueModel::log_likelihood_about(ensemble, history, simulated)
-            }
-            None if any_stood => f64::NEG_INFINITY,
-            None => 0.0,
-        };
-        labels.sum::<f64>() + values
-    };
-    let worlds = &prior.prior().worlds;
-    let logs: Vec<f64> = (0..worlds.len()).map(log_likelihood).collect();
-    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let relative: Vec<f64> = logs.iter().map(|log| exp(log - largest)).collect();
-    let sum: f64 = relative.iter().sum();
-    let weight = |(world, relative): (&crate::optimize::prior::World, f64)| WorldWeight {
-        name: world.name.clone(),
-        weight: relative / sum,
-    };
-    worlds.iter().zip(relative).map(weight).collect()
+    let shares = worlds::normalized(&worlds::log_likelihoods(ensemble, history), 1.0);
+    let named = prior.prior().worlds.iter().zip(shares);
+    named.map(|(world, weight)| WorldWeight { name: world.name.clone(), weight }).collect()
 }

@@ -9,6 +9,7 @@ pub mod insight;
 pub mod model;
 pub mod safeguard;
 pub mod search;
+pub mod worlds;
 
 use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::gp;
@@ -58,7 +59,8 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
 /// The models of value and standing. `None` if a covariance cannot be factored.
 fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
     let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
-    Some((value, StandingModel::fit(ensemble, history)?))
+    let shares = worlds::shares(&worlds::log_likelihoods(ensemble, history));
+    Some((value, StandingModel::fit(ensemble, history, shares)?))
 }
 
 /// The proposal of the model; `None` if a covariance cannot be factored.

@@ -2,7 +2,8 @@
 //!
 //! Value: y = b + rho m + sum w_j phi_j + delta + eps, of the jumps that stood; b ~ N(0, 0.5^2), rho ~ N(1, 0.3^2),
 //! w_j ~ N(0, 2/r), delta Matern 5/2, all linear terms integrated out (Kennedy and O'Hagan, "Bayesian calibration of computer
-//! models", J. R. Statist. Soc. B 63, 2001). Standing: f = b0 + b1 g + b2 z + sum gamma_j psi_j + delta_c, with a logistic likelihood.
+//! models", J. R. Statist. Soc. B 63, 2001). Standing: f = b0 + b1 sum q_k l_k + b2 z + sum gamma_j psi_j + delta_c, with a logistic
+//! likelihood; q_k is the share of world k (`worlds.rs`).
 //! Values are in units of the prior's scale about its offset.
 
 use super::history::History;
@@ -68,13 +69,13 @@ impl ValueModel {
         ValueModel::about(observed, linear, &hyper_prior(0.0), history.dimensions)
     }
 
-    /// ln p of the values about a single simulated robot, given as a function of the point in scaled units, with the bias and the
+    /// ln p of the values about a single simulated robot, given by its scaled values at the jumps that stood, with the bias and the
     /// median hyperparameters.
-    pub fn log_likelihood_about(ensemble: &Ensemble, history: &History, simulated: impl Fn(&[f64]) -> f64) -> f64 {
+    pub fn log_likelihood_about(ensemble: &Ensemble, history: &History, simulated: &[f64]) -> f64 {
         let linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, 0.0] };
         let observed = Observations {
             points: history.stood().map(|jump| jump.point.clone()).collect(),
-            terms: history.stood().map(|jump| vec![1.0, simulated(&jump.point)]).collect(),
+            terms: simulated.iter().map(|value| vec![1.0, *value]).collect(),
             values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
         };
         let theta = hyper_prior(DELTA).median(history.dimensions).to_log();
@@ -159,6 +160,8 @@ fn hyper_prior(signal: f64) -> HyperPrior {
 pub struct StandingModel {
     points: Vec<Vec<f64>>,
     terms: Vec<Vec<f64>>,
+    /// Share of each world in the label.
+    shares: Vec<f64>,
     linear: LinearPrior,
     hyper: Hyperparameters,
     /// `None` before the first jump.
@@ -166,21 +169,18 @@ pub struct StandingModel {
 }
 
 impl StandingModel {
-    /// Fits all jumps. `None` if the mode is not found.
-    pub fn fit(ensemble: &Ensemble, history: &History) -> Option<StandingModel> {
+    /// Fits all jumps; `shares` are those of the worlds. `None` if the mode is not found.
+    pub fn fit(ensemble: &Ensemble, history: &History, shares: Vec<f64>) -> Option<StandingModel> {
         let r = ensemble.components().1;
         let prior = ensemble.standing;
         let mut linear = LinearPrior { mean: prior.mean.to_vec(), variance: prior.deviation.map(|s| s * s).to_vec() };
         linear.mean.extend(std::iter::repeat_n(0.0, r));
         linear.variance.extend(std::iter::repeat_n(LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64, r));
-        let terms = history.jumps.iter().map(|jump| jump.features.standing.clone()).collect();
-        StandingModel::about(history, terms, linear, STANDING.1)
-    }
-
-    fn about(history: &History, terms: Vec<Vec<f64>>, linear: LinearPrior, signal: f64) -> Option<StandingModel> {
+        let terms: Vec<Vec<f64>> = history.jumps.iter().map(|jump| shared(&jump.features, &shares)).collect();
         let points: Vec<Vec<f64>> = history.jumps.iter().map(|jump| jump.point.clone()).collect();
         let stood: Vec<bool> = history.jumps.iter().map(|jump| jump.stood).collect();
-        let hyper = Hyperparameters { lengthscale: vec![STANDING.0; history.dimensions], signal, noise: 0.0 };
+        let hyper =
+            Hyperparameters { lengthscale: vec![STANDING.0; history.dimensions], signal: STANDING.1, noise: 0.0 };
         let n = points.len();
         let laplace = if n == 0 {
             None
@@ -191,11 +191,12 @@ impl StandingModel {
             let mean = DVector::from_iterator(n, terms.iter().map(|h: &Vec<f64>| linear.expected(h)));
             Some(Laplace::fit(&k, &mean, &stood)?)
         };
-        Some(StandingModel { points, terms, linear, hyper, laplace })
+        Some(StandingModel { points, terms, shares, linear, hyper, laplace })
     }
 
-    /// The probability of standing at a point with its linear terms, averaged over the uncertainty.
-    pub fn probability(&self, x: &[f64], terms: &[f64]) -> f64 {
+    /// The probability of standing at a point with the prior's terms there, averaged over the uncertainty.
+    pub fn probability(&self, x: &[f64], features: &Features) -> f64 {
+        let terms = &shared(features, &self.shares)[..];
         let mean = self.linear.expected(terms);
         let variance = self.hyper.signal + self.linear.covariance(terms, terms);
         let Some(laplace) = &self.laplace else { return averaged_sigmoid(mean, variance) };
@@ -206,4 +207,11 @@ impl StandingModel {
             .map(|(p, h)| self.hyper.kernel(p, x) + self.linear.covariance(h, terms));
         laplace.probability(mean, &DVector::from_iterator(self.points.len(), covariance), variance)
     }
+}
+
+/// The terms of standing with the label that the worlds have together by their shares, in place of their mean label.
+fn shared(features: &Features, shares: &[f64]) -> Vec<f64> {
+    let mut terms = features.standing.clone();
+    terms[1] = features.labels.iter().zip(shares).map(|(label, share)| label * share).sum();
+    terms
 }

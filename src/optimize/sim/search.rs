@@ -111,7 +111,7 @@ impl<'a> Acquisition<'a> {
         candidates: &[(Vec<f64>, Features)],
     ) -> Option<Self> {
         let origin = (ensemble.lowest.min(0.0) - ensemble.offset) / ensemble.scale;
-        let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, &f.standing));
+        let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, f));
         let stood: Vec<(f64, f64)> = history.stood().map(|jump| at(&jump.point, &jump.features)).collect();
         let safe = stood.iter().filter(|(_, p)| *p >= INCUMBENT).map(|(mean, _)| *mean).reduce(f64::max);
         // All stood by luck: the surest of them, less a unit.
@@ -133,7 +133,7 @@ impl<'a> Acquisition<'a> {
     /// Predicts at a point with its terms.
     pub fn predict(&self, x: &[f64], features: &Features) -> PointPrediction {
         let (mean, variance) = self.value.predict(x, &features.value);
-        PointPrediction { mean, variance, p_stand: self.standing.probability(x, &features.standing) }
+        PointPrediction { mean, variance, p_stand: self.standing.probability(x, features) }
     }
 
     /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not
