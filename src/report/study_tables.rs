@@ -34,8 +34,11 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
     let columns = columns.chain(several_units.then(|| Column::text("unit"))).chain([Column::number("trial", "")]);
     let sum = |count: fn(&ReportedStudy) -> usize| studies.iter().map(count).sum::<usize>();
     let (trials, counted) = (sum(|study| study.trials().count()), sum(|study| study.counted().count()));
+    let waiting = sum(|study| study.trials().filter(|row| row.verdict.is_none()).count());
+    let waiting = if waiting > 0 { format!(", {waiting} without a verdict") } else { String::new() };
+    let plural = if trials == 1 { "" } else { "s" };
     let caption = format!(
-        "Studies. {trials} trials, {counted} counted: repeats that confirm the best and void trials do not count. A proposal that \
+        "Studies. {trials} trial{plural}, {counted} counted{waiting}: repeats that confirm the best and void trials do not count. A proposal that \
          was not run is no trial."
     );
     let mut table = Table::new(caption, columns);
@@ -265,7 +268,7 @@ pub fn trials(study: &ReportedStudy) -> Table {
 pub fn remarks(studies: &[ReportedStudy]) -> Option<Table> {
     let columns = ["study", "trial", "verdict", "cause", "note"].map(Column::text);
     let mut table =
-        Table::new("Falls, void trials and verdicts of the operator with their causes, and notes.", columns);
+        Table::new("Falls, void trials and verdicts other than suggested, with their causes, and notes.", columns);
     for study in studies {
         for row in &study.rows {
             let explained = matches!(row.verdict, Some(Verdict::Fall | Verdict::Void)) || row.is_overruled();

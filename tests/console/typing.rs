@@ -234,7 +234,7 @@ fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_char
     console.press(&["o", "Down", "1", "O", "2", "F5"]);
     assert_shows(
         &console.screen(80, 24),
-        &["`O` does not belong here", "Enter and Q ask again, Esc drops the number."],
+        &["`O` does not belong here", "Enter, Up, Down and Q ask again, Esc drops the number."],
     );
     assert_eq!(console.requests(&["Q"]), []);
     assert_shows(&console.screen(80, 24), &["a character was not taken; Q again queues 12"]);
@@ -248,6 +248,23 @@ fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_char
     assert_eq!(console.requests(&["Enter"]), overridden(12.0));
     // A number that is typed anew has no missing character.
     assert_eq!(console.requests(&["o", "Down", "7", "O", "Backspace", "8", "Enter"]), overridden(8.0));
+}
+
+/// Regression: after `Down` that asked, the number for the next row was appended to that of this one: `w`, 1.2, Down, 100 made 1.2100.
+#[test]
+fn a_number_after_a_key_that_asked_is_a_new_one() {
+    let mut console = Console::ready();
+    console.press(&["o", "w", "1", ".", "2", "Down"]);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Down again takes 1.2"]);
+    console.press(&["1", "0", "0", "Down"]);
+    assert_shows(&console.screen(80, 24), &["f0 = 100 Hz is outside"]);
+    // Without a number no key that moves asks.
+    console.press(&["Esc", "x"]);
+    assert_shows(&console.screen(80, 24), &["Enter and Q ask again, Esc cancels."]);
+    console.press(&["Down"]);
+    console.enter("105");
+    let request = OperatorRequest::Override { parameter: "Fx".into(), value: 105.0 };
+    assert_eq!(console.requests(&["Enter"]), [request]);
 }
 
 /// Regression: after a character that was not taken the last line promised that Enter confirms.

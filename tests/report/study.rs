@@ -154,6 +154,16 @@ fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {
     }
 }
 
+/// Regression: a trial that waits for its verdict was counted, and no column had it.
+#[test]
+fn the_table_of_studies_says_how_many_trials_have_no_verdict() {
+    let caption = |rows| text::render(&study_page::page(&[study(0, rows)], &[], "0.1.0 (test)"), 80);
+    let waiting = |trial| TrialRecord { verdict: None, ..row(trial, Verdict::Accept, 0.5) };
+    assert!(caption(vec![waiting(0)]).contains("Studies. 1 trial, 0 counted, 1 without a verdict: repeats"));
+    let two = vec![row(0, Verdict::Accept, 0.5), row(1, Verdict::Fall, 0.0)];
+    assert!(caption(two).contains("Studies. 2 trials, 2 counted: repeats"));
+}
+
 #[test]
 fn the_origins_of_verdicts_are_a_line_of_ranges() {
     let judged = |trial: u32, judged_by| TrialRecord { judged_by, ..row(trial, Verdict::Accept, 0.5) };

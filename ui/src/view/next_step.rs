@@ -356,8 +356,9 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             }
         }
         Dialog::Override(form) if dialog.has_refused_character() => {
-            let esc = if form.typing.is_some() { "drops the number" } else { "cancels" };
-            format!("Enter and {} ask again, Esc {esc}.", key(Action::QueuePoint))
+            let (keys, esc) =
+                if form.typing.is_some() { ("Enter, Up, Down", "drops the number") } else { ("Enter", "cancels") };
+            format!("{keys} and {} ask again, Esc {esc}.", key(Action::QueuePoint))
         }
         Dialog::Override(form) if form.typing.is_none() => {
             let queue = key(Action::QueuePoint);

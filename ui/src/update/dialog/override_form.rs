@@ -33,7 +33,8 @@ impl OverrideForm {
         }
     }
 
-    /// Reports, before a key uses the number, that a character of it was not taken; the key uses it when pressed again.
+    /// Reports, before a key uses the number, that a character of it was not taken; the key uses it when pressed again, and a digit
+    /// begins the number anew.
     fn asks_about_refused_character(&mut self, key: Key, does: &str) -> bool {
         if !self.problem.as_deref().is_some_and(is_refused_character) {
             return false;
@@ -41,6 +42,7 @@ impl OverrideForm {
         let shown = self.rows.get(self.selected).map(|row| six_digits(row.value)).unwrap_or_default();
         let number = self.typing.as_ref().map_or(shown.as_str(), |input| input.value());
         self.problem = Some(acknowledges_refused_character(&format!("{key} again {does} {number}")));
+        self.replaces = true;
         true
     }
 
@@ -107,7 +109,8 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
                 return request(model, OperatorRequest::Enqueue(point));
             }
         }
-        KeyCode::Up | KeyCode::Down | KeyCode::Tab if form.asks_about_refused_character(key, "takes") => {}
+        KeyCode::Up | KeyCode::Down | KeyCode::Tab
+            if form.typing.is_some() && form.asks_about_refused_character(key, "takes") => {}
         KeyCode::Up => form.select(form.selected.saturating_sub(1)),
         KeyCode::Down | KeyCode::Tab => form.select(form.selected + 1),
         KeyCode::Left if form.typing.is_none() => form.step(-0.01),
