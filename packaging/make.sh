@@ -18,6 +18,7 @@ version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct 2>/dev/null || echo 0)
 export SOURCE_DATE_EPOCH
 mkdir -p "$packages"
+rm -f "$packages/SHA256SUMS"
 
 # Says why a target cannot be built; nothing if it can.
 missing() {
@@ -43,7 +44,8 @@ program() {
         local gcc="${target%%-*}-linux-gnu-gcc" upper=${target//-/_}
         export "CARGO_TARGET_${upper^^}_LINKER=$gcc" "CC_$upper=$gcc"
     fi
-    cargo build "${arguments[@]}" >&2
+    # In a condition bash does not end the function at a command that failed: the program of an earlier build would be packed.
+    cargo build "${arguments[@]}" >&2 || return 1
     echo "$folder/$profile/quadfrog"
 }
 
@@ -98,6 +100,8 @@ host_program=$(program "$host")
 generate "$host_program"
 made=0
 for target in "$@"; do
+    # No package of an earlier build passes for one of this.
+    rm -f "$packages/quadfrog-$version-$target.tar.gz" "$packages/quadfrog_$version-1_$(debian "$target").deb"
     reason=$(missing "$target")
     if [ -n "$reason" ]; then
         echo "$target: not made; $reason"
