@@ -5,7 +5,7 @@ use super::study::{ReportedStudy, TrialChoice, by_task};
 use super::study_figures::{DrawnTrial, TaskStudies, drawn};
 use super::study_tables::{self as tables, title};
 use crate::optimize::ask::Direction;
-use crate::trial::{ParameterInfo, Task, six_digits};
+use crate::trial::{ParameterInfo, Task, counted, six_digits};
 
 /// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn; `version`: that of the program
 /// that writes the report, with its commit.
@@ -87,7 +87,7 @@ fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
 fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section {
     let mut section = Section::new("Results");
     section.blocks.push(Block::Table(tables::studies(studies)));
-    section.blocks.push(Block::Table(tables::checkpoints(groups)));
+    section.blocks.extend(tables::checkpoints(groups).map(Block::Table));
     for group in groups {
         section.blocks.push(Block::Figure(TaskStudies::new(group).convergence()));
         let best = tables::best(group);
@@ -153,7 +153,7 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
         .map(|trials| trials.join(", "));
     let recorded = study.trials().filter(|row| study.has_ticks_of(row.trial)).count();
     let in_part = if in_part.is_empty() { String::new() } else { format!(", of trial {in_part} in part") };
-    let recorded = format!("Ticks of {recorded} of {} trials are recorded{in_part}", study.trials().count());
+    let recorded = format!("Ticks of {recorded} of {} are recorded{in_part}", counted(study.trials().count(), "trial"));
     let end = match without_jump.as_str() {
         "" => String::new(),
         trials => format!(" The ticks of trial {trials} end before the impulse: there is no jump to draw."),

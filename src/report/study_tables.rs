@@ -4,7 +4,7 @@ use super::page::{Cell, Column, Table};
 use super::study::{ReportedStudy, mean_and_deviation};
 use super::study_figures::DrawnTrial;
 use crate::robot::JOINT_NAMES;
-use crate::trial::{Task, TrialRecord, Verdict, parameter_unit};
+use crate::trial::{Task, TrialRecord, Verdict, counted as in_words, parameter_unit};
 
 /// Numbers of trials at which the best so far is listed.
 const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
@@ -36,10 +36,10 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
     let (trials, counted) = (sum(|study| study.trials().count()), sum(|study| study.counted().count()));
     let waiting = sum(|study| study.trials().filter(|row| row.verdict.is_none()).count());
     let waiting = if waiting > 0 { format!(", {waiting} without a verdict") } else { String::new() };
-    let plural = if trials == 1 { "" } else { "s" };
     let caption = format!(
-        "Studies. {trials} trial{plural}, {counted} counted{waiting}: repeats that confirm the best and void trials do not count. A proposal that \
-         was not run is no trial."
+        "Studies. {}, {counted} counted{waiting}: repeats that confirm the best and void trials do not count. A proposal that \
+         was not run is no trial.",
+        in_words(trials, "trial")
     );
     let mut table = Table::new(caption, columns);
     for study in studies {
@@ -67,20 +67,20 @@ pub fn title(study: &ReportedStudy) -> String {
     study.task.map_or_else(|| study.name.clone(), |task| format!("{}, {}", task.name(), study.label()))
 }
 
-/// Best so far after some numbers of trials, mean and deviation over the studies of each task.
-pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
-    let longest = groups.iter().flatten().map(|study| study.best_so_far().len()).max().unwrap_or(0);
+/// Best so far after some numbers of trials, mean and deviation over the studies of each task; none without a trial that counts.
+pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
+    let longest =
+        groups.iter().flatten().map(|study| study.best_so_far().len()).max().filter(|longest| *longest > 0)?;
     let mut at: Vec<usize> = CHECKPOINTS.into_iter().filter(|count| *count < longest).collect();
     at.push(longest);
     let columns = [Column::text("task"), Column::number("studies", "")].into_iter();
-    let columns = columns.chain(at.iter().map(|count| Column::number(format!("{count} trials"), "")));
+    let columns = columns.chain(at.iter().map(|count| Column::number(in_words(*count, "trial"), "")));
     let caption = "Best value so far, mean and standard deviation over the studies, in the unit of J.";
     let mut table = Table::new(caption, columns);
     for group in groups {
         let curves: Vec<Vec<f64>> = group.iter().map(|study| study.best_so_far()).collect();
         let cell = |count: &usize| {
-            // Before the first counted trial there is no value.
-            let at = |curve: &Vec<f64>| curve.get(count.checked_sub(1)?).copied().filter(|value| value.is_finite());
+            let at = |curve: &Vec<f64>| curve.get(*count - 1).copied().filter(|value| value.is_finite());
             let values: Option<Vec<f64>> = curves.iter().map(at).collect();
             values.filter(|values| !values.is_empty()).map_or(Cell::Missing, |values| {
                 let (mean, deviation) = mean_and_deviation(&values);
@@ -94,7 +94,7 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Table {
         let cells = [Cell::text(name), Cell::count(group.len())].into_iter().chain(at.iter().map(cell));
         table.rows.push(cells.collect());
     }
-    table
+    Some(table)
 }
 
 /// Agreement of the expectations of the sampler's model with the results; none without an expectation.

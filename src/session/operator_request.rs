@@ -4,7 +4,7 @@
 use std::fmt;
 
 use crate::telemetry::ArmingCheck;
-use crate::trial::{Verdict, six_digits};
+use crate::trial::{Verdict, counted, six_digits};
 
 /// Arming check that only the operator can confirm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -119,11 +119,6 @@ pub enum OperatorRequest {
     TakeControl,
 }
 
-/// Returns a number of things in words, `1 trial` or `5 trials`.
-pub fn counted(number: u32, thing: &str) -> String {
-    if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
-}
-
 impl fmt::Display for OperatorRequest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -140,7 +135,7 @@ impl fmt::Display for OperatorRequest {
             OperatorRequest::OverrideGain { gain, value } => write!(f, "set the gain {gain} = {}", six_digits(*value)),
             OperatorRequest::ClearOverrides => f.write_str("clear the overrides"),
             OperatorRequest::Fix { parameter, value, trials } => {
-                write!(f, "fix {parameter} = {} for {}", six_digits(*value), counted(*trials, "trial"))
+                write!(f, "fix {parameter} = {} for {}", six_digits(*value), counted(*trials as usize, "trial"))
             }
             OperatorRequest::Unfix { parameter } => write!(f, "search {parameter} again"),
             OperatorRequest::NarrowBounds { parameter, low, high } => {
@@ -148,7 +143,7 @@ impl fmt::Display for OperatorRequest {
             }
             OperatorRequest::ConfirmBest { repeats: 0 } => f.write_str("end the repeats"),
             OperatorRequest::ConfirmBest { repeats } => {
-                write!(f, "confirm the best with {}", counted(*repeats, "repeat"))
+                write!(f, "confirm the best with {}", counted(*repeats as usize, "repeat"))
             }
             OperatorRequest::Judge(verdict) => f.write_str(verdict.name()),
             OperatorRequest::Rerun { trial: None } => f.write_str("re-run"),
@@ -166,7 +161,7 @@ impl fmt::Display for OperatorRequest {
             // Not its number, which stays at its place: the moved point has another one afterwards.
             OperatorRequest::MoveQueued { earlier: true, .. } => f.write_str("move earlier"),
             OperatorRequest::MoveQueued { earlier: false, .. } => f.write_str("move later"),
-            OperatorRequest::Continue(trials) => write!(f, "continue for {}", counted(*trials, "trial")),
+            OperatorRequest::Continue(trials) => write!(f, "continue for {}", counted(*trials as usize, "trial")),
             OperatorRequest::VoidBecause { reason, rerun: false } => write!(f, "void because: {reason}"),
             OperatorRequest::VoidBecause { reason, rerun: true } => write!(f, "re-run because: {reason}"),
             OperatorRequest::ChangeVerdict { trial, verdict, reason } => {

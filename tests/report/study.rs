@@ -135,6 +135,17 @@ fn best_so_far_counts_accepted_trials_alone() {
     assert_eq!(mean_and_deviation(&[3.0]), (3.0, 0.0));
 }
 
+/// Regression: the table of the best value so far had a column `0 trials` with nothing in it, or a column `1 trials`.
+#[test]
+fn the_best_so_far_is_left_out_before_the_first_counted_trial() {
+    let shown = |rows| text::render(&study_page::summary(&study(0, rows)), 80);
+    let none = shown(vec![row(0, Verdict::Void, 0.0)]);
+    assert!(!none.contains("0 trials") && !none.contains("Best value so far"), "{none}");
+    assert!(none.contains("Studies. 1 trial, 0 counted") && none.contains("No trial of forward"), "{none}");
+    let one = shown(vec![row(0, Verdict::Accept, 0.5)]);
+    assert!(one.contains("Best value so far") && !one.contains("trials\n"), "{one}");
+}
+
 /// Regressions: the table of the studies was split at 80 columns, and repeats that confirm the best were among the accepted.
 #[test]
 fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {

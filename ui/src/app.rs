@@ -13,6 +13,7 @@ use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::telemetry::Mode;
+use quadfrog::trial::counted;
 use ratatui::Frame;
 use ratatui::widgets::Clear;
 use tokio::signal::unix::{SignalKind, signal};
@@ -328,8 +329,10 @@ impl Console {
                 let written = export::table(&self.model, rows);
                 let (shown, all) = (self.model.trial_rows().len(), self.model.every_trial().len());
                 let count = match rows {
-                    ExportedRows::All => format!("all {all} trials"),
-                    ExportedRows::Shown => format!("{shown} of {all} trials, {} left out", all - shown.min(all)),
+                    ExportedRows::All => format!("all {}", counted(all, "trial")),
+                    ExportedRows::Shown => {
+                        format!("{shown} of {}, {} left out", counted(all, "trial"), all - shown.min(all))
+                    }
                 };
                 self.say_written(written, |path| {
                     format!("written: {count}, {} and the same as .md beside it", path.display())

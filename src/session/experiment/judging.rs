@@ -6,7 +6,7 @@ use super::{Experiment, ExperimentState, PendingVerdict};
 use crate::optimize::study::{Outcome, StudyError};
 use crate::session::objective;
 use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{JudgedBy, JumpParameters, TrialRecord, Verdict};
+use crate::trial::{JudgedBy, JumpParameters, TrialRecord, Verdict, counted};
 
 const NOT_UNDER_REVIEW: &str = "no trial is under review";
 
@@ -23,7 +23,8 @@ impl Experiment {
         let (mut suggested, mut cause) = objective::suggest_measured(end, measured.as_ref(), rule.bounce);
         let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
         if missing > 0 && suggested == Verdict::Accept {
-            (suggested, cause) = (Verdict::Void, format!("{missing} ticks of it were not recorded: not measured"));
+            (suggested, cause) =
+                (Verdict::Void, format!("{} of it not recorded: not measured", counted(missing as usize, "tick")));
         } else if objective::trips_limit(end) && !jumped {
             (suggested, cause) = (Verdict::Void, format!("before the jump: {cause}"));
         }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::unfinished::Asker;
 use crate::session::experiment::{Experiment, RequestRefusal};
-use crate::session::operator_request::{OperatorRequest, counted};
+use crate::session::operator_request::OperatorRequest;
 use crate::session::storage::JobOutput;
-use crate::trial::{ExperimentStage, FixedParameter, Verdict, four_digits, parameter_unit, six_digits};
+use crate::trial::{ExperimentStage, FixedParameter, Verdict, counted, four_digits, parameter_unit, six_digits};
 
 /// Carries out a request of `asker`. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest, asker: Asker) -> JobOutput {
@@ -233,7 +233,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::Continue(trials) => {
             experiment.extend(*trials)?;
-            format!("the study ends with {}", counted(experiment.budget(), "counted trial"))
+            format!("the study ends with {}", counted(experiment.budget() as usize, "counted trial"))
         }
         _ => return Err(RequestRefusal::NotNow("this is no request to the study".to_owned())),
     })

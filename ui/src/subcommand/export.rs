@@ -12,6 +12,7 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
+use quadfrog::trial::counted;
 
 use super::arguments::{one_of, whole_number};
 use super::completion;
@@ -122,7 +123,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
                 Ok(())
             })?;
             let size_mb = std::fs::metadata(path).map_or(0.0, |about| about.len() as f64 / 1e6);
-            notice!("{rows} rows, {size_mb:.1} MB: {}", path.display());
+            notice!("{}, {size_mb:.1} MB: {}", counted(rows as usize, "row"), path.display());
         }
         None => match signals.export(&mut players, range, format, &mut output::Data).and_then(|_| output::Data.flush())
         {

@@ -7,6 +7,7 @@ use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EngineError, running_session};
 use quadfrog::recording::{RecordingError, recover};
+use quadfrog::trial::counted;
 
 use super::failure::Failure;
 
@@ -27,7 +28,12 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
         None => recover::recover(file),
     };
     let recovered = recovered.map_err(failure)?;
-    put_line!("{}: {} ticks, {} messages", recovered.path.display(), recovered.ticks, recovered.messages);
+    put_line!(
+        "{}: {}, {}",
+        recovered.path.display(),
+        counted(recovered.ticks as usize, "tick"),
+        counted(recovered.messages as usize, "message")
+    );
     match recovered.lost {
         Some(lost) => put_line!("The recording is not complete: {lost}."),
         None => put_line!("Nothing was lost."),

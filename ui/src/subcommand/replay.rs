@@ -17,6 +17,7 @@ use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
+use quadfrog::trial::counted;
 
 use super::arguments;
 use super::console::{ScreenArguments, options};
@@ -184,7 +185,12 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
     }
     let extras = player.check_extras()?;
     let seconds = player.duration_ns() as f64 / 1e9;
-    put_line!("{}: {seconds:.3} s, {ticks} ticks, {records} records", file.display());
+    put_line!(
+        "{}: {seconds:.3} s, {}, {}",
+        file.display(),
+        counted(ticks as usize, "tick"),
+        counted(records as usize, "record")
+    );
     for lost in player.lost() {
         let [from_s, to_s] = [lost.from_ns, lost.to_ns].map(|time_ns| time_ns as f64 / 1e9);
         put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);

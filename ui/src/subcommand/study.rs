@@ -17,8 +17,7 @@ use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, fixed_in_words, rows_of};
-use quadfrog::session::operator_request::counted;
-use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, six_digits};
+use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, counted, six_digits};
 use serde_json::Value;
 
 use super::completion;
@@ -245,9 +244,8 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     text += &table::origins(&rows);
     let not_run = rows.iter().filter(|row| row.was_not_run()).count();
     if not_run > 0 {
-        let proposals = counted(not_run as u32, "proposal");
-        let _ =
-            writeln!(text, "{} that ran, {proposals} that did not", counted((rows.len() - not_run) as u32, "trial"));
+        let proposals = counted(not_run, "proposal");
+        let _ = writeln!(text, "{} that ran, {proposals} that did not", counted(rows.len() - not_run, "trial"));
     }
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
@@ -330,12 +328,12 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     if !queue {
         let given = finished.len();
         let added = experiment::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
-        let mut text = format!("{added} trials imported");
+        let mut text = format!("{} imported", counted(added, "trial"));
         if given > added {
             let _ = write!(text, "; {} were there already (same parameters, value and times)", given - added);
         }
         if !unfinished.is_empty() {
-            let _ = write!(text, "; {} unfinished trials are ignored, --queue queues them", unfinished.len());
+            let _ = write!(text, "; {} ignored, --queue queues them", counted(unfinished.len(), "unfinished trial"));
         }
         output::text(&(text + "\n"));
         return Ok(());
@@ -348,7 +346,7 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    output::text(&format!("{} points are queued\n", points.len()));
+    output::text(&format!("{} queued\n", counted(points.len(), "point")));
     Ok(())
 }
 

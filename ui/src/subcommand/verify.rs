@@ -9,6 +9,7 @@ use clap::Args;
 use quadfrog::engine::{self, TickDifference, Verification, VerifyError};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::session_files::recordings_of;
+use quadfrog::trial::counted;
 
 use super::failure::Failure;
 
@@ -56,7 +57,11 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
     })?;
     match verified {
         Verification::Equal { trials, ticks, left_out } => {
-            put_line!("{file}: {ticks} ticks of {trials} trials are simulated again, every one the same bit for bit");
+            put_line!(
+                "{file}: {} of {} are simulated again, every one the same bit for bit",
+                counted(ticks as usize, "tick"),
+                counted(trials, "trial")
+            );
             if !left_out.is_empty() {
                 let numbers = left_out.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
                 put_line!("not compared, because a person, a fault or a crash ended them: trials {numbers}");

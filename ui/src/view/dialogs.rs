@@ -9,9 +9,9 @@
 //!          └─────────────────────────────────────────────────┘
 //! ```
 
-use quadfrog::session::operator_request::{OperatorCheck, counted};
+use quadfrog::session::operator_request::OperatorCheck;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Task, six_digits};
+use quadfrog::trial::{Task, counted, six_digits};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::symbols::border;
@@ -303,7 +303,7 @@ fn field(
         }
         Purpose::ConfirmBest => {
             let needed = match model.contenders.map(|contenders| model.session.trials.least_repeats(contenders)) {
-                Some(least) if least > 0 => format!("; to compare them takes {}", counted(least as u32, "repeat")),
+                Some(least) if least > 0 => format!("; to compare them takes {}", counted(least, "repeat")),
                 _ => String::new(),
             };
             let last = match model.session.undoable() {

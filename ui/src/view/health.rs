@@ -5,6 +5,7 @@ use quadfrog::recording::record::HealthLimits;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::ArmingCheck;
+use quadfrog::trial::counted;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -234,9 +235,9 @@ fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
             None => row("written", "-".to_owned(), false),
         },
         disk.map_or(row("disk", "-".to_owned(), false), |d| row("disk", d.found.clone(), !d.state.allows())),
-        row("not recorded", format!("{} ticks", counters.ticks_not_recorded), counters.ticks_not_recorded > 0),
-        detail("not shown", format!("{} ticks", counters.ticks_not_shown), false),
-        detail("refused", format!("{} commands", counters.commands_refused), false),
+        row("not recorded", counted(counters.ticks_not_recorded as usize, "tick"), counters.ticks_not_recorded > 0),
+        detail("not shown", counted(counters.ticks_not_shown as usize, "tick"), false),
+        detail("refused", counted(counters.commands_refused as usize, "command"), false),
     ]);
     if let Some(LiveStatus { address, viewers, dropped }) = model.viewers {
         rows.push(row("live view", format!("{address}, {viewers} viewers, {dropped} messages left out"), false));

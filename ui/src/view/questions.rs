@@ -1,9 +1,8 @@
 //! The texts of the questions: each says what follows, and Cancel is the default and comes first.
 
 use quadfrog::session::objective;
-use quadfrog::session::operator_request::counted;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, counted, six_digits};
 use ratatui::text::Line;
 
 use super::draw::{number, span};
@@ -152,7 +151,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let before = model.session.queue().iter().filter(|point| !confirms(point.source)).count();
             let follows = match model.session.open_proposal() {
                 None => "will wait in the queue until the study has more trials".to_owned(),
-                Some(_) if before > 0 => format!("will wait in the queue behind {}", counted(before as u32, "point")),
+                Some(_) if before > 0 => format!("will wait in the queue behind {}", counted(before, "point")),
                 Some(proposal) if confirms(proposal.source) => {
                     "will be the proposal; the repeat follows them".to_owned()
                 }
@@ -203,7 +202,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             ("Take the last verdict back?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "undo")])
         }
         Question::EndRepeats => {
-            let left = counted(model.session.confirming().unwrap_or(0), "repeat");
+            let left = counted(model.session.confirming().unwrap_or(0) as usize, "repeat");
             let mut lines = vec![Line::from(format!("{left} will not be run: the best is not confirmed."))];
             lines.extend(model.session.undoable().map(|trial| {
                 let undo = model.keymap.key(Action::Undo);

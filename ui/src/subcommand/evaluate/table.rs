@@ -2,7 +2,7 @@
 
 use quadfrog::session::evaluation::EvaluatedRun;
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::ParameterValues;
+use quadfrog::trial::{ParameterValues, counted};
 
 use super::variant::{Variant, on_off};
 
@@ -10,7 +10,8 @@ use super::variant::{Variant, on_off};
 pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Variant, EvaluatedRun)]) -> String {
     let TrialSpec { task, jumps, rate, .. } = *spec;
     let values: Vec<String> = point.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
-    let mut text = format!("{} of the {robot}, {}, {jumps} jumps\n", task.name(), values.join(", "));
+    let mut text =
+        format!("{} of the {robot}, {}, {}\n", task.name(), values.join(", "), counted(jumps as usize, "jump"));
     let with_friction = runs.iter().any(|(variant, _)| variant.friction.is_some());
     let friction = |text: &str| if with_friction { format!("{text:>8}  ") } else { String::new() };
     text += &format!(
@@ -46,7 +47,7 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
         for run in all.iter().filter(|run| !run.stood() || run.bounced()) {
             let time = run.fall_time_s.map_or(String::new(), |time| format!(" at {time:.2} s"));
             let EvaluatedRun { seed, cause, jumps, .. } = run;
-            text += &format!("     seed {seed}: {cause}{time}, after {jumps} jumps\n");
+            text += &format!("     seed {seed}: {cause}{time}, after {}\n", counted(*jumps as usize, "jump"));
         }
     }
     text += "Means with standard deviations; value, roll and pitch of the runs that stood. Tilt: of the trunk when an impulse starts.\n";

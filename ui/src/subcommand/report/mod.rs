@@ -11,6 +11,7 @@ use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::report::study::TrialChoice;
 use quadfrog::report::{html, study_page, svg, text};
+use quadfrog::trial::counted;
 
 use super::arguments::VERSION;
 use super::completion;
@@ -63,8 +64,10 @@ pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
             && !studies.iter().any(|study| study.row(*number).is_some())
         {
             let most = studies.iter().map(|study| study.rows.len()).max().unwrap_or(0);
-            let message =
-                format!("--trials {number}: there is no such trial; the studies have at most {most} trials, from 0");
+            let message = format!(
+                "--trials {number}: there is no such trial; the studies have at most {}, from 0",
+                counted(most, "trial")
+            );
             return Err(Failure::input(message));
         }
     }
