@@ -76,7 +76,7 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
     assert_eq!(best(&mut console, Some(3)), []);
     assert_shows(&console.screen(80, 24), &["the best is trial 3, which is not in this recording"]);
     console.press(&["Esc", "G"]);
-    assert_shows(&console.screen(80, 24), &["or best of the recording"]);
+    assert_shows(&console.screen(80, 24), &["best of the recording"]);
 }
 
 /// Two judged trials with signals, and trial 2 proposed.

@@ -167,8 +167,8 @@ fn places_are_typed_as_times_seconds_and_trials() {
     go(&mut session, "#3", &shown(span(3).begin_ns));
     for (place, problem) in [
         ("99:00", "is after the end"),
-        ("soon", "a character was not taken"),
-        ("1:75", "is no time"),
+        ("soon", "`soon` is no place"),
+        ("1:75", "is no place"),
         ("#77", "trial 77 is not in"),
     ] {
         session.send(&format!("G{place}\r"));

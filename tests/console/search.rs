@@ -104,7 +104,11 @@ fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
     assert!(line_with(&screen, "Fx  ").contains("fixed at 75.00, 3 more"), "{screen}");
     assert!(line_with(&screen, "  X  ").contains("search Fx again"), "{screen}");
     assert_eq!(console.requests(&["X"]), [OperatorRequest::Unfix { parameter: "Fx".into() }]);
-    let refusals = [("0", "is not a number of trials"), ("-1", "was not taken"), ("many", "nothing was typed yet")];
+    let refusals = [
+        ("0", "is not a number of trials"),
+        ("-1", "was not taken"),
+        ("many", "`y` does not belong here: a number is typed; Esc cancels"),
+    ];
     for (wrong, refusal) in refusals {
         let mut console = overriding();
         console.press(&["X", "Backspace"]);

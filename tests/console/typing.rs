@@ -6,7 +6,7 @@ use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
-use quadfrog_console::message::{Effect, Msg, ReplayStatus};
+use quadfrog_console::message::{Effect, Msg, ReplayCommand, ReplayStatus};
 use quadfrog_console::theme::Role;
 
 /// A finished study.
@@ -93,7 +93,9 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     // With nothing typed there is nothing to confirm.
     let mut without_value = finished();
     assert_eq!(without_value.requests(&["C", "Backspace", "x", "Enter"]), []);
-    assert_shows(&without_value.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
+    assert_shows(&without_value.screen(80, 24), &["`x` does not belong here: a number is typed; Esc cancels"]);
+    assert_eq!(without_value.requests(&["Enter"]), []);
+    assert_shows(&without_value.screen(80, 24), &["nothing was typed: a number of trials from 1 to 1000 is needed"]);
     // The form of the overrides refuses a letter aloud, too.
     let mut console = Console::ready();
     assert_eq!(console.requests(&["o", "x"]), []);
@@ -166,11 +168,47 @@ fn no_dialog_and_no_message_has_a_number_of_17_digits() {
 fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus::default()));
-    console.press(&["G", "p"]);
+    console.press(&["G", "?"]);
     let screen = console.screen(80, 24);
-    assert_shows(&screen, &["`p` does not belong here: a time, a trial as #7, or best is typed"]);
+    assert_shows(&screen, &["`?` does not belong here: a time, a trial as #7, best or fall is typed"]);
     console.press(&["Enter"]);
-    assert_shows(&console.screen(80, 24), &["nothing was typed yet; Esc cancels"]);
+    assert_shows(&console.screen(80, 24), &["a time, a trial as #7, best or fall is typed; Esc"]);
+    assert_eq!(console.press(&["Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["nothing was typed: 12:34, 75.5 (seconds), #7 (a trial), best or"]);
+}
+
+/// Regression: of a word the field took the letters of `best` alone and then said that nothing was typed; `fall` was refused.
+#[test]
+fn a_word_that_is_no_place_in_a_recording_is_named() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    console.press(&["G"]);
+    assert_shows(&console.screen(80, 24), &["trial #7, best of the recording, fall"]);
+    console.enter("worst");
+    assert_eq!(console.press(&["Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["`worst` is no place; write 12:34, 75.5 (seconds), #7 (a trial), best"]);
+    // The refused word is selected: the next one replaces it.
+    console.enter("fall");
+    assert_eq!(console.press(&["Enter"]), [Effect::Replay(ReplayCommand::NextFall)]);
+}
+
+/// Regression: the first Esc of the form of the overrides dropped the typed number without a word, and the form seemed stuck.
+#[test]
+fn the_form_of_the_overrides_says_what_esc_drops() {
+    let mut console = Console::ready();
+    console.press(&["o", "9", "9"]);
+    assert_shows(&console.next_step(), &["Enter applies the number. Esc drops it; Esc again closes."]);
+    assert_eq!(console.press(&["Esc"]), []);
+    assert_shows(&console.screen(80, 24), &["99 was dropped: f0 stays", "Esc again closes the form."]);
+    console.press(&["Down"]);
+    assert!(!console.screen(80, 24).contains("was dropped"));
+    // A value that was taken over before is dropped with the form.
+    console.press(&["1", "0", "0", "Down", "5", "Esc"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["5 was dropped: Fz stays", "Esc again closes the form and drops its"]);
+    assert_eq!(console.requests(&["Esc"]), []);
+    assert_eq!(console.said(), "cancelled: nothing was changed");
+    assert!(!console.screen(80, 24).contains("Override trial"));
 }
 
 /// Regression: messages stayed after what they offered, or what they described, had ended.

@@ -146,7 +146,7 @@ pub enum Purpose {
     },
     TrialNumber,
     LogSearch,
-    /// A time or a trial of a replay.
+    /// A time or a trial of a replay, by number or word.
     Seek,
     /// The trial beside the one at the playhead of a replay.
     Beside,
@@ -157,7 +157,7 @@ pub enum Purpose {
 /// End of the message about a character that is not part of a number.
 pub const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
 /// End of the message about a character that is not part of a place in a recording.
-pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, or best is typed";
+pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, best or fall is typed";
 
 /// Whether a message of a form is about a character that was not taken. It stays until it is acknowledged: 1.5 would become 15 unseen.
 pub fn is_refused_character(message: &str) -> bool {
@@ -176,8 +176,25 @@ impl Purpose {
             Purpose::HandValue(_) | Purpose::Bounds { .. } => Some("0123456789.,+-e"),
             Purpose::Continue | Purpose::Fix { .. } | Purpose::ConfirmBest | Purpose::TrialNumber => Some("0123456789"),
             Purpose::Beside => Some("0123456789#"),
-            Purpose::Seek => Some("0123456789.,:#best"),
+            Purpose::Seek => Some("0123456789.,:#abcdefghijklmnopqrstuvwxyz"),
             Purpose::Note(_)
+            | Purpose::VoidReason { .. }
+            | Purpose::ChangeVerdict { .. }
+            | Purpose::LogSearch
+            | Purpose::Rejudge => None,
+        }
+    }
+
+    /// The content without which the field confirms nothing; none for a field that may be empty or asks for a reason.
+    pub fn needed(self) -> Option<&'static str> {
+        match self {
+            Purpose::Continue | Purpose::Fix { .. } => Some("a number of trials from 1 to 1000"),
+            Purpose::ConfirmBest => Some("a number of repeats from 1 to 1000"),
+            Purpose::Bounds { .. } => Some("a range as 50..120"),
+            Purpose::TrialNumber | Purpose::Beside => Some("the number of a trial"),
+            Purpose::Seek => Some("12:34, 75.5 (seconds), #7 (a trial), best or fall"),
+            Purpose::HandValue(_)
+            | Purpose::Note(_)
             | Purpose::VoidReason { .. }
             | Purpose::ChangeVerdict { .. }
             | Purpose::LogSearch
@@ -271,6 +288,8 @@ pub struct OverrideForm {
     /// Whether the whole typed number is selected, because it was refused: the first character typed replaces it.
     pub replaces: bool,
     pub problem: Option<String>,
+    /// The typed number that Esc has dropped, until the next key.
+    pub dropped: Option<String>,
 }
 
 /// One parameter or gain of the form.
@@ -307,7 +326,15 @@ impl OverrideForm {
         let gains = proposal.gains.iter().filter_map(|p| Some(row(p, session.gain(&p.name)?.clone(), true)));
         let rows: Vec<OverrideRow> = parameters.chain(gains).collect();
         let selected = selected.min(rows.len().saturating_sub(1));
-        OverrideForm { trial: proposal.trial, rows, selected, typing: None, replaces: false, problem: None }
+        OverrideForm {
+            trial: proposal.trial,
+            rows,
+            selected,
+            typing: None,
+            replaces: false,
+            problem: None,
+            dropped: None,
+        }
     }
 
     /// Whether it holds values that the session has not received.

@@ -215,10 +215,24 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
         lines.push(Line::from(spans));
     }
     let note = "This does not move the robot: it is approved like any other proposal.";
-    let below =
-        form.problem.as_ref().map_or(span(theme, Role::Quiet, note), |text| span(theme, Role::Bad, text.as_str()));
+    let below = match (&form.problem, &form.dropped) {
+        (Some(problem), _) => span(theme, Role::Bad, problem.as_str()),
+        (None, Some(number)) => span(theme, Role::Warning, dropped(number, form)),
+        (None, None) => span(theme, Role::Quiet, note),
+    };
     lines.extend([Line::default(), Line::from(below)]);
     lines
+}
+
+/// The number of the form that Esc has dropped, and the effect of the next Esc.
+fn dropped(typed: &str, form: &OverrideForm) -> String {
+    let value = form
+        .rows
+        .get(form.selected)
+        .map_or(String::new(), |row| format!("{} stays {} {}", row.name, number(row.value), row.unit));
+    let what = if typed.is_empty() { "Nothing was typed".to_owned() } else { format!("{typed} was dropped") };
+    let values = if form.is_changed() { "closes the form and drops its values" } else { "closes the form" };
+    format!("{what}: {value}. Esc again {values}.")
 }
 
 fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
@@ -318,7 +332,7 @@ fn field(
             )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Seek => "12:34 or 1:02:03.5, seconds as 75.5, a trial #7, or best of the recording".to_owned(),
+        Purpose::Seek => "12:34, 1:02:03.5, seconds 75.5, trial #7, best of the recording, fall".to_owned(),
         Purpose::Rejudge => "a folder as for --config; empty: the defaults; the file is not changed".to_owned(),
         Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
             Some(second) => format!("its number in {}", second.name),

@@ -364,7 +364,7 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             let queue = key(Action::QueuePoint);
             format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels.")
         }
-        Dialog::Override(_) => "Enter takes the value and applies. Esc drops it.".to_owned(),
+        Dialog::Override(_) => "Enter applies the number. Esc drops it; Esc again closes.".to_owned(),
         Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
         Dialog::Confirm(Question::Skip { trial, .. }) => {
             format!("Press y to skip trial #{trial}. Any other key cancels.")

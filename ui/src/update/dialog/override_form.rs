@@ -84,10 +84,12 @@ impl OverrideForm {
 }
 
 pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Effect> {
+    form.dropped = None;
     match key.code() {
         KeyCode::Esc if form.typing.is_some() => {
-            form.typing = None;
+            form.dropped = form.typing.take().map(|input| input.value().to_owned());
             form.problem = None;
+            form.replaces = false;
         }
         KeyCode::Esc => return cancelled(model, "nothing was changed"),
         KeyCode::Enter if form.asks_about_refused_character(key, "confirms") => {}

@@ -48,7 +48,8 @@ pub(super) fn key(
                 ("", Purpose::HandValue(trial)) if model.session.measured_objective_of(trial).is_some() => {
                     acknowledges_refused_character("Enter again goes back to the measured value")
                 }
-                ("", _) => "nothing was typed yet; Esc cancels".to_owned(),
+                // The sentence names the character and what is taken.
+                ("", _) => format!("{}; Esc cancels", problem.unwrap_or_default()),
                 (number, _) => acknowledges_refused_character(&format!("Enter again confirms {number}")),
             });
         }
@@ -82,6 +83,9 @@ pub(super) fn key(
 /// # Errors
 /// The reason when the text is refused.
 fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>, String> {
+    if let Some(needed) = purpose.needed().filter(|_| text.is_empty()) {
+        return Err(format!("nothing was typed: {needed} is needed; Esc cancels"));
+    }
     let wanted = match purpose {
         Purpose::Note(trial) => OperatorRequest::Note { trial, text: text.to_owned() },
         Purpose::HandValue(_) if text.is_empty() => OperatorRequest::HandValue(None),
@@ -149,6 +153,9 @@ fn is_doubted(model: &Model, value: f64) -> bool {
 
 /// The place that a text names: a time or a trial.
 fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
+    if text == "fall" {
+        return Ok(ReplayCommand::NextFall);
+    }
     if text == "best" {
         let timeline = model.timeline.as_ref();
         let best = timeline.and_then(|timeline| timeline.best).ok_or("the recording has no accepted trial")?;
@@ -171,7 +178,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
             })
         };
     }
-    let refused = || format!("`{text}` is no time; write it as 12:34, 75.5 (seconds), #7 (a trial) or best");
+    let refused = || format!("`{text}` is no place; write 12:34, 75.5 (seconds), #7 (a trial), best or fall");
     let mut time_s = 0.0;
     let parts: Vec<&str> = text.strip_suffix('s').unwrap_or(text).split(':').collect();
     for (index, part) in parts.iter().enumerate() {
