@@ -1,11 +1,11 @@
 //! Texts of 80 columns and 24 rows that a reader without the manual understands.
 
-use crate::support::{Console, assert_shows, line_with, session, tick, trial};
-use quadfrog::recording::record::Record;
+use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
+use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, ParameterInsight, PointRecord, ProposalInsight, ProposalSource, QueuedPoint,
-    REMOVED, SearchStatus, SearchedParameter, TrialRecord, Verdict,
+    Approval, ExperimentStage, FixedParameter, JudgedBy, ParameterInsight, PointRecord, ProposalInsight,
+    ProposalSource, QueuedPoint, REMOVED, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::message::Msg;
 
@@ -74,6 +74,74 @@ fn the_keys_in_the_heading_of_trials_stay_while_the_counts_grow() {
     }
     console.press(&["S", "F"]);
     assert_shows(&console.screen(80, 24), &["reversed, F only accept, x columns"]);
+}
+
+/// Regression: `s` sorted by `judged_by`, which 80 columns do not show.
+#[test]
+fn the_order_passes_over_columns_that_have_no_room() {
+    let orders = |columns: u16, rows: u16| {
+        let mut console = Console::ready();
+        console.update(Msg::Resize(columns, rows));
+        for number in 0..3 {
+            let row = trial(number, Some(Verdict::Accept), None);
+            console.record(Record::Trial(TrialRecord { judged_by: Some(JudgedBy::Operator), ..row }));
+        }
+        console.press(&["2"]);
+        let order = |console: &mut Console| {
+            console.press(&["s"]);
+            let heading = line_with(&console.screen(columns, rows), "Trials ─").to_owned();
+            heading.split("; by ").nth(1).and_then(|rest| rest.split(" (").next()).unwrap_or_default().to_owned()
+        };
+        (0..20).map(|_| order(&mut console)).collect::<std::collections::BTreeSet<_>>()
+    };
+    let narrow = orders(80, 24);
+    assert!(!narrow.contains("judged_by") && narrow.contains("Fz") && narrow.contains("cause"), "{narrow:?}");
+    assert!(orders(200, 60).contains("judged_by"));
+}
+
+/// Regression: under `--approve falls-only` the first line lost the number of the best trial at 80 columns.
+#[test]
+fn the_first_line_names_the_best_trial_beside_the_rule_of_approval() {
+    for task in [Task::Forward, Task::LateralRight] {
+        let mut console = Console::ready();
+        let info = SessionInfo { approve: Approval::FallsOnly, task: Some(task), ..session() };
+        console.record(Record::Session(info));
+        console.judged(14);
+        console.record(Record::Trial(trial(14, Some(Verdict::Accept), None)));
+        console.record(Record::Proposal(proposal(15, 0)));
+        console.stage(ExperimentStage::Proposed, 15);
+        let first = console.screen(80, 24).lines().next().unwrap_or_default().to_owned();
+        assert_shows(&first, &["FALLS", task.name(), "#15", "best 0.540 m (#14)", "REC 00:00"]);
+        assert_shows(&console.screen(120, 40), &["APPROVE FALLS-ONLY", "trial #15", "(#14)"]);
+    }
+}
+
+/// Regression: at 60x20, which has no table, the last line named the keys of the selected row of Trials.
+#[test]
+fn a_compact_terminal_names_no_key_of_a_row() {
+    let mut console = Console::ready();
+    console.judged(3);
+    console.press(&["2"]);
+    assert_shows(console.screen(80, 24).lines().last().unwrap_or_default(), &["Enter open"]);
+    let lines: Vec<String> = console.screen(60, 20).lines().map(str::to_owned).collect();
+    let last = lines[18..].join(" ");
+    assert!(!last.contains("open") && !last.contains("judge") && last.contains("Press g twice to jump"), "{last}");
+}
+
+/// Regression: the details of a trial had the note below the first page, and the table cuts note and cause at 80 columns.
+#[test]
+fn one_key_shows_note_and_cause_whole() {
+    let mut console = Console::ready();
+    let note = "the left hind foot stood on the cable, so that the robot turned to the right at the end of its landing";
+    let cause =
+        "by the operator: the cable was pulled; looked like accept: landed and settled, after a long slip of one foot";
+    let row = trial(0, Some(Verdict::Fall), Some(Verdict::Accept));
+    let gains = vec![("kp".to_owned(), 400.0), ("kd".to_owned(), 8.0), ("k_att".to_owned(), 200.0)].into();
+    console.record(Record::Trial(TrialRecord { note: note.into(), cause: cause.into(), gains, ..row }));
+    console.press(&["2", "Home", "Enter"]);
+    let screen = console.screen(80, 24).replace('│', " ");
+    let words = screen.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_shows(&words, &[note, "the cable was pulled", "after a long slip of one foot"]);
 }
 
 /// Regression: the times of the stages took two lines once they had two digits.

@@ -313,14 +313,16 @@ fn sorting_puts_what_has_no_value_last_both_ways() {
 #[test]
 fn the_sorting_key_goes_through_all_shown_columns() {
     let mut console = twelve();
+    console.update(Msg::Resize(200, 60));
     let mut seen = Vec::new();
-    for _ in 0..9 {
+    for _ in 0..8 {
         console.press(&["s"]);
         let line = line_with(&console.screen(200, 60), "; by ");
         let by = line.split("; by ").nth(1).and_then(|rest| rest.split(" (").next()).expect("a column").to_owned();
         seen.push(by);
     }
-    assert_eq!(seen, ["value", "verdict", "f0", "Fx", "Fz", "judged_by", "source", "cause", "number"]);
+    // Without a verdict of known origin the table has no column of origins.
+    assert_eq!(seen, ["value", "verdict", "f0", "Fx", "Fz", "source", "cause", "number"]);
 }
 
 #[test]

@@ -10,6 +10,7 @@ pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod rejudged;
 pub mod session;
+pub mod table_columns;
 pub(crate) mod trials;
 
 use std::collections::BTreeMap;

@@ -8,6 +8,7 @@ use super::request::reply;
 use crate::action::Action;
 use crate::column::Column;
 use crate::model::live::Panel;
+use crate::model::table_columns::{CellContent, shown_columns};
 use crate::model::trials::SortBy;
 use crate::model::{Model, View};
 use crate::series::SETS;
@@ -135,11 +136,15 @@ pub(super) fn next_mode(model: &mut Model) {
     };
 }
 
-/// Sorts by the next shown column: number, value and verdict first, then the others from left to right.
+/// Sorts by the next column that the terminal shows: number, value and verdict first, then the others from left to right.
 pub(super) fn next_sort(model: &mut Model) {
     let view = &model.trial_table;
     let mut orders = vec![SortBy::Number];
-    let shown = |column: &Column| view.columns.contains(column);
+    let columns = shown_columns(model, usize::from(model.size.0), true);
+    let shown = |column: &Column| match column {
+        Column::Parameters => columns.iter().any(|column| matches!(column.cell, CellContent::Parameter(_))),
+        column => columns.iter().any(|shown| matches!(shown.cell, CellContent::Of(of) if of == *column)),
+    };
     let first = [Column::Value, Column::Verdict];
     orders.extend(first.into_iter().filter(shown).map(SortBy::Column));
     for column in Column::VARIANTS.iter().copied().filter(shown).filter(|column| !first.contains(column)) {

@@ -5,7 +5,7 @@ use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
 use super::draw::span;
-use super::{countdown, dialogs, next_step, proposal, status_bar};
+use super::{countdown, dialogs, last_line, proposal, status_bar};
 use crate::layout::{CompactAreas, MIN_COLUMNS, MIN_ROWS};
 use crate::model::Model;
 use crate::theme::Role;
@@ -25,6 +25,6 @@ pub fn render(frame: &mut Frame, areas: CompactAreas, model: &Model) {
     status_bar::render_message(frame, message, model);
     // Two rows, less the margin of the second and what is lost where the first one is broken between words.
     let columns = usize::from(next_step.width);
-    let line = next_step::line_within(model, 2 * columns - 1 - LONGEST_KEY);
+    let line = last_line::line_within(model, 2 * columns - 1 - LONGEST_KEY, false);
     frame.render_widget(Paragraph::new(wrap(&line, columns, 1)), next_step);
 }

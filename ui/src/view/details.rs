@@ -45,6 +45,10 @@ pub fn details(
         None if !trial.cause.is_empty() => row("cause", trial.cause.clone()),
         None => {}
     }
+    // The table cuts cause and note: both are shown before the first page ends.
+    if !trial.note.is_empty() {
+        row("note", trial.note.clone());
+    }
     let use_of = |value: f64| match trial.verdict {
         Some(_) => format!("{value:.4} {unit}, reported to the optimizer"),
         None => format!("{value:.4} {unit} if it is judged as suggested"),
@@ -130,9 +134,6 @@ pub fn details(
         };
         let text = format!("{value:.4} {unit}, deviation {deviation:.4} {unit}, stands with {:.1} %", 100.0 * p_stand);
         row("expected", text + &simulated);
-    }
-    if !trial.note.is_empty() {
-        row("note", trial.note.clone());
     }
     rows
 }

@@ -26,6 +26,7 @@ mod drawing;
 mod health;
 mod health_history;
 mod help;
+mod last_line;
 mod live;
 mod log;
 pub mod next_step;
@@ -92,5 +93,5 @@ fn render_parts(frame: &mut Frame, model: &Model) {
     countdown::render(frame, body, model);
     timeline::render(frame, timeline, model);
     status_bar::render_message(frame, message, model);
-    next_step::render(frame, next_step, model);
+    last_line::render(frame, next_step, model);
 }

@@ -59,49 +59,70 @@ fn backend(model: &Model) -> Span<'static> {
     }
 }
 
-/// Mode, machine, task, trial and best, within `room` characters: a number is shown whole or not at all.
+/// Mode, machine, task, trial and best, within `room` characters: words give way before numbers, and a number is shown whole or
+/// not at all.
 fn identity(model: &Model, width: u16, room: usize) -> Line<'static> {
+    let columns = |spans: &[Span]| spans.iter().map(Span::width).sum::<usize>();
+    let forms = [Words::Whole, Words::Few, Words::Fewest].into_iter().skip(usize::from(width < 100));
+    let mut lines: Vec<_> = forms.map(|words| identity_in(model, words)).collect();
+    let at = lines.iter().position(|(spans, _)| columns(spans) <= room).unwrap_or(lines.len() - 1);
+    let (mut spans, mut ends) = lines.swap_remove(at);
+    while columns(&spans) > room
+        && let Some(end) = ends.pop()
+    {
+        spans.truncate(end);
+    }
+    Line::from(spans)
+}
+
+/// Words beside the numbers of the first line.
+#[derive(Clone, Copy, PartialEq)]
+enum Words {
+    Whole,
+    Few,
+    Fewest,
+}
+
+/// The parts of the first line with these words, and the numbers of parts before which it can end, the least important last.
+fn identity_in(model: &Model, words: Words) -> (Vec<Span<'static>>, Vec<usize>) {
     let theme = &model.theme;
     let mut spans = vec![mode_span(model), Span::raw(" "), backend(model), Span::raw("  ")];
     let session = &model.session.info;
     if session.observe {
         spans.push(span(theme, Role::Warning, "OBSERVING  "));
     }
-    // A narrow terminal has room for the best value only if the words are left out.
-    let narrow = width < 100;
     if session.approve != Approval::Each && model.replay.is_none() {
         let approve = session.approve.name().to_uppercase();
-        let text = if narrow { format!("{approve}  ") } else { format!("APPROVE {approve}  ") };
+        let text = match words {
+            Words::Whole => format!("APPROVE {approve}  "),
+            Words::Few => format!("{approve}  "),
+            Words::Fewest => format!("{}  ", approve.split('-').next().unwrap_or_default()),
+        };
         spans.push(span(theme, Role::Warning, text));
     }
     spans.push(Span::raw(session.task_name()));
-    // Where the line can end, the least important part last.
     let mut ends = Vec::new();
     if let Some(trial) = model.session.shown_trial() {
         let (finished, budget) = (model.session.counted(), model.session.budget());
-        let (trial, counted) = match narrow {
-            true => (format!("  trial #{trial}"), format!("  {finished}/{budget}")),
-            false => (format!("   trial #{trial}"), format!("   {finished} of {budget} counted")),
+        let parts = match words {
+            Words::Whole => [format!("   trial #{trial}"), format!("   {finished} of {budget} counted")],
+            Words::Few => [format!("  trial #{trial}"), format!("  {finished}/{budget}")],
+            Words::Fewest => [format!("  #{trial}"), format!("  {finished}/{budget}")],
         };
-        for part in [trial, counted] {
+        for part in parts {
             ends.push(spans.len());
             spans.push(Span::raw(part));
         }
     }
     if let Some((best, value)) = model.session.trials.best_value() {
         ends.push(spans.len());
-        spans.push(Span::raw(if narrow { "  best " } else { "   best " }));
+        spans.push(Span::raw(if words == Words::Whole { "   best " } else { "  best " }));
         let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
         spans.push(span(theme, Role::Good, format!("{} {}{by_hand}", number(value), session.unit)));
         ends.push(spans.len());
         spans.push(span(theme, Role::Quiet, format!(" (#{best})")));
     }
-    while spans.iter().map(Span::width).sum::<usize>() > room
-        && let Some(end) = ends.pop()
-    {
-        spans.truncate(end);
-    }
-    Line::from(spans)
+    (spans, ends)
 }
 
 fn recording(model: &Model) -> Vec<Span<'static>> {
