@@ -32,7 +32,9 @@ const CONTROL: &str = "control.toml";
 /// trial: some limits have a key for the simulator and one for hardware.
 pub fn limit_key(end: &TrialEnd, settings: &ControlSettings) -> Option<LimitKey> {
     let ((key, value), file) = match end {
-        TrialEnd::Settled | TrialEnd::Stopped | TrialEnd::Cancelled | TrialEnd::SatDown => return None,
+        TrialEnd::Settled | TrialEnd::Stopped | TrialEnd::Cancelled | TrialEnd::Refused(_) | TrialEnd::SatDown => {
+            return None;
+        }
         TrialEnd::NotQuiet => (("settle.cap_s", settings.settle.cap_s), CONTROL),
         TrialEnd::Fell(cause) => (fall_key(cause, settings), SAFETY),
         TrialEnd::NotReady(TrialInhibit::NotQuiet { .. }) | TrialEnd::Held(TrialInhibit::NotQuiet { .. }) => {

@@ -65,7 +65,7 @@ impl<R: Robot> Rollout<R> {
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
                 Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),
-                Event::Refused { .. } => Some(TrialEnd::Cancelled),
+                Event::Refused { because, .. } => Some(TrialEnd::Refused(because)),
                 Event::Mode { .. } | Event::SetUpright => None,
             });
             if let Some(end) = ended {

@@ -17,6 +17,8 @@ pub enum TrialEnd {
     Stopped,
     /// The countdown was cancelled.
     Cancelled,
+    /// The control thread refused it before its countdown.
+    Refused(CommandRefusal),
     /// A fault ended it.
     Fault(Fault),
     /// The countdown was cancelled: the robot was not ready for the jump.

@@ -677,6 +677,34 @@ fn an_accepted_request_to_sit_down_in_the_last_jump_sits_the_robot_down() {
     assert_eq!(session.records.iter().find(refused), None);
 }
 
+/// Regression: of a jump that the control thread refused before its countdown the cause was that the countdown was cancelled; the
+/// reason was in the log alone.
+#[test]
+fn a_jump_that_is_refused_before_its_countdown_has_the_reason_as_its_cause() {
+    let mut session = Session::new(Backend::Simulator, None);
+    assert!(session.request(OperatorRequest::Arm).accepted);
+    session.ticks(4000);
+    assert_eq!(session.body.mode(), Mode::Ready);
+    let proposal = session.records.iter().rev().find_map(|record| match record {
+        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+        _ => None,
+    });
+    let (trial, revision) = proposal.expect("a proposal");
+    let time_ns = session.time_ms * 1_000_000;
+    let request = OperatorRequest::Approve { trial, revision };
+    session.supervisor.handle_request(&StampedRequest { request, stops: 0, time_ns }, time_ns);
+    // Between the session's approval and the tick in which the control thread receives it.
+    session.operator.stop.set();
+    session.ticks(2000);
+    let row = session.records.iter().rev().find_map(|record| match record {
+        Record::Trial(row) if row.trial == trial => Some(row.clone()),
+        _ => None,
+    });
+    let row = row.expect("its row");
+    assert_eq!((row.suggested, row.verdict), (Some(Verdict::Void), None));
+    assert_eq!(row.cause, "not begun: STOP is set");
+}
+
 /// With mosh or in tmux the loss of the operator is not detected, so the robot would go on.
 #[test]
 fn a_connection_that_cannot_be_seen_is_confirmed_before_a_real_robot_is_armed() {

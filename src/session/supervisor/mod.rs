@@ -402,7 +402,7 @@ impl Supervisor {
                     Command::RunTrial(spec, _) => {
                         let end = match because {
                             CommandRefusal::Inhibited(inhibit) => TrialEnd::NotReady(inhibit),
-                            _ => TrialEnd::Cancelled,
+                            refusal => TrialEnd::Refused(refusal),
                         };
                         self.ended = Some(Ended { trial: spec.trial, end, ticks: 0, time_ns });
                         self.unmeasured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
