@@ -54,6 +54,7 @@ use crate::realtime::system::descriptors;
 use crate::recording::live::{LiveServer, LiveStatus};
 use crate::recording::record::{LogLevel, Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
+use crate::recording::session_files::unfinished_in;
 use crate::robot::hardware::{HardwareError, Network, OpenedRobot};
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
@@ -94,6 +95,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     // A simulated robot begins like a real one: lying folded on its belly.
     robot.place(&Placement { joint_position: settings.lying_position, lying: true, seed: u64::from(options.seed) });
     let folder = prepare_folder(&options)?;
+    // Of earlier sessions: that of this one does not exist yet.
+    let unfinished = options.folder.as_deref().map(unfinished_in).unwrap_or_default();
     let recording = folder.recording.clone();
     let recording_name =
         recording.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
@@ -128,6 +131,13 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
         SupervisorParts { experiment, control: session_end, ticks, sinks, recorder: status, checklist, approval, info };
     let mut supervisor = supervise(parts, maker, &options, settings, &clock)?;
     let storage = supervisor.storage_watch();
+    for file in unfinished {
+        let file = file.display();
+        let message = format!(
+            "an earlier session did not finish its recording. After this session: quadfrog recover {file} (replay and report read it as it is)"
+        );
+        supervisor.log(LogLevel::Warning, message, clock.now_ns());
+    }
     if let Ok((granted, denied)) = scheduled.recv() {
         supervisor.report_scheduling(&granted, &denied, clock.now_ns());
     }

@@ -39,6 +39,13 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     files.into_iter().map(|(.., path)| path).collect()
 }
 
+/// Returns the recordings in a folder that no session has finished, without those that were recovered. That of a session that runs
+/// is among them.
+pub fn unfinished_in(folder: &Path) -> Vec<PathBuf> {
+    let unfinished = |path: &PathBuf| path.extension().is_some_and(|end| end == "part");
+    recordings_in(folder).into_iter().filter(unfinished).collect()
+}
+
 /// Returns the files that a path names: itself, the recordings of a folder, or those of the newest study in it.
 ///
 /// # Errors

@@ -88,6 +88,13 @@ fn a_leftover_of_a_killed_session_is_damaged_also_beside_the_session_that_contin
     command.args(["--resume", study.to_str().unwrap()]);
     let mut session = Session::run(&program.path("."), SIZE, command);
     session.wait_for(&["Press A to arm"]);
+    // Regression: after the resume nothing on the screen named the unfinished recording or the command that repairs it.
+    let joined = |session: &Session| session.screen().split_whitespace().collect::<String>();
+    let hint = format!("quadfrogrecover{}", left.display());
+    session.wait_until("the hint", || joined(&session).contains(&hint));
+    session.send("6");
+    session.wait_for(&["an earlier session did not finish its recording"]);
+    session.send("1");
     let written = study.join("session-2.mcap.part");
     assert_shows(&program.text(&["replay", "--check", written.to_str().unwrap()]), &["a session still writes it"]);
     // By the name alone, too.
@@ -104,6 +111,7 @@ fn a_leftover_of_a_killed_session_is_damaged_also_beside_the_session_that_contin
     command.args(["--resume", study.to_str().unwrap()]);
     let mut session = Session::run(&program.path("."), SIZE, command);
     session.wait_for(&["Press A to arm"]);
+    assert!(!session.screen().contains("did not finish its recording"), "{}", session.screen());
     let (_, screen) = quit(&mut session);
     assert!(screen.contains("play the recording") && !screen.contains("repair"), "{screen}");
     let report = program.text(&["report", study.to_str().unwrap()]);

@@ -20,7 +20,7 @@ use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
 use quadfrog::recording::recorder::RecorderStatus;
-use quadfrog::recording::session_files::recordings_in;
+use quadfrog::recording::session_files::{recordings_in, unfinished_in};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::hardware::{HardwareError, Network};
 use quadfrog::trial::{Approval, Backend, Task};
@@ -167,7 +167,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let console = console.with_robot(RobotFacts::new(robot.clone(), &config, backend, selected.seed.into()));
     let earlier = if arguments.resume.is_some() { recordings_in(&selected.folder) } else { Vec::new() };
     let console = console.with_earlier(earlier);
-    let incomplete = incomplete_recordings(&selected.folder);
+    let incomplete = unfinished_in(&selected.folder);
     let mut options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
@@ -290,12 +290,6 @@ fn address(text: &str) -> Result<SocketAddr, Failure> {
     };
     let mut found = text.to_socket_addrs().map_err(|error| refuse(error.to_string()))?;
     found.next().ok_or_else(|| refuse("no such host".to_owned()))
-}
-
-/// Returns the recordings that earlier sessions of this study did not finish, without those that were recovered.
-fn incomplete_recordings(folder: &Path) -> Vec<PathBuf> {
-    let files = recordings_in(folder).into_iter();
-    files.filter(|path| path.extension().is_some_and(|extension| extension == "part")).collect()
 }
 
 /// Returns the settings of `console.toml`.
