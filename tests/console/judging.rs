@@ -496,6 +496,15 @@ fn the_question_before_quitting_says_what_becomes_of_the_robot_and_of_the_trial(
     let ends = "The simulation ends as the robot stands";
     assert_shows(&question(Mode::Ready, ExperimentStage::Proposed, simulator), &[ends, "trials count so far"]);
     assert_shows(&question(Mode::Ready, ExperimentStage::Proposed, hardware), &["it will sit down before"]);
+    // Regression: nothing was said of the proposal.
+    let again = "Trial #0 is not run: it is proposed again then, with these values.";
+    assert_shows(&question(Mode::Ready, ExperimentStage::Proposed, simulator), &[again]);
+    let mut console = Console::ready();
+    let mut changed = proposal(0, 1);
+    changed.parameters[1].value = 99.0;
+    console.record(Record::Proposal(changed));
+    console.press(&["q"]);
+    assert_shows(&console.screen(120, 40), &["proposed again then, with the values set here."]);
     let lands = "the robot lands first; it is void, and its parameters run again";
     assert_shows(&question(Mode::Jump, ExperimentStage::Running, simulator), &["Trial #0 is under way", lands]);
     let waits = "it has landed, is measured, and waits until the study is continued";

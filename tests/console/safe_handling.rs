@@ -213,3 +213,23 @@ fn a_recovery_that_does_not_fit_names_its_cause_and_leaves_nothing() {
     let left = |name: &str| Path::new(&program.path(name)).exists();
     assert!(!left("cut.mcap") && !left("cut.mcap.recovering") && left("cut.mcap.part"));
 }
+
+/// The promise of the question before quitting: a changed proposal comes again with its values.
+#[test]
+fn a_session_that_was_quit_proposes_the_same_values_again() {
+    let program = Program::new();
+    let (mut session, study) = console(&program);
+    session.send("o");
+    session.wait_for(&["Override trial"]);
+    session.send("1.3\x1b[B88\r");
+    session.wait_for(&["Trial #0 (operator)"]);
+    session.send("A");
+    session.wait_for(&["Press g twice to jump"]);
+    session.send("q");
+    session.wait_for(&["Trial #0 is not run: it is proposed again then, with the values set here."]);
+    session.send("y");
+    session.wait();
+    let mut session = Session::start(&program.path("."), SIZE, &["--resume", study.to_str().unwrap()]);
+    session.wait_for(&["Trial #0 (operator)", "1.300 Hz", "88.00 N"]);
+    quit(&mut session);
+}
