@@ -885,6 +885,9 @@ pub struct Trial {
     /// origin of the verdict; none without a verdict, and in older recordings
     #[prost(enumeration = "trial::JudgedBy", optional, tag = "20")]
     pub judged_by: ::core::option::Option<i32>,
+    /// proposed values of the parameters and gains that the operator has changed; none in older recordings
+    #[prost(message, repeated, tag = "21")]
+    pub proposed: ::prost::alloc::vec::Vec<trial::Parameter>,
 }
 /// Nested message and enum types in `Trial`.
 pub mod trial {

@@ -10,8 +10,8 @@ use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial, TrialState};
-use crate::session::experiment::attributes::StudyAttributes;
 use crate::session::experiment::rows_of;
+use crate::session::experiment::study_attributes::StudyAttributes;
 use crate::trial::{ParameterInfo, Task, TrialRecord, Verdict};
 
 /// Description of a stored study of this program.

@@ -11,8 +11,9 @@ use crate::optimize::journal::Durability;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::recording::record::SessionInfo;
-use crate::session::experiment::attributes::{
-    self, BackendAttribute, BudgetAttribute, NewStudyAttributes, Origin, SamplerAttribute, StudyAttributes,
+use crate::session::experiment::attributes::{self, Origin};
+use crate::session::experiment::study_attributes::{
+    BackendAttribute, BudgetAttribute, NewStudyAttributes, SamplerAttribute, StudyAttributes,
 };
 use crate::session::experiment::{self, Experiment, ExperimentPlan};
 use crate::trial::{Backend, ParameterInfo, Task};

@@ -48,7 +48,9 @@ pub fn trial(way: Way, ours: &mut TrialRecord, m: &mut frog::Trial) -> Done {
     way.copy(&mut ours.seed, &mut m.seed);
     way.list(&mut ours.ranges, &mut m.ranges, drawn_range)?;
     way.option(&mut ours.expected, &mut m.expected, expected)?;
-    way.maybe_variant(&mut ours.judged_by, &mut m.judged_by, "origin of a verdict")
+    way.maybe_variant(&mut ours.judged_by, &mut m.judged_by, "origin of a verdict")?;
+    way.values(&mut ours.proposed, &mut m.proposed);
+    Ok(())
 }
 
 fn drawn_range(way: Way, ours: &mut DrawnRange, m: &mut frog::trial::Range) -> Done {

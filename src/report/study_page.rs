@@ -4,6 +4,7 @@ use super::page::{Block, Page, Section};
 use super::study::{ReportedStudy, TrialChoice, by_task};
 use super::study_figures::{DrawnTrial, TaskStudies, drawn};
 use super::study_tables::{self as tables, title};
+use super::table;
 use crate::optimize::ask::Direction;
 use crate::trial::{ParameterInfo, Task, counted, six_digits};
 
@@ -173,6 +174,12 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
 
 fn verdicts(studies: &[ReportedStudy]) -> Section {
     let mut section = Section::new("Trials, verdicts and notes");
+    for study in studies {
+        let interventions = table::interventions(&study.rows);
+        if !interventions.is_empty() {
+            section.paragraph(format!("{}: {interventions}.", title(study)));
+        }
+    }
     section.blocks.extend(tables::remarks(studies).map(Block::Table));
     section.blocks.extend(tables::overrides(studies).map(Block::Table));
     section.blocks.extend(studies.iter().map(|study| Block::Table(tables::trials(study))));

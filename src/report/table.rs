@@ -5,7 +5,10 @@ use std::fmt::Write;
 
 use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
-use crate::trial::{JudgedBy, JumpRow, ParameterInfo, ParameterValues, TrialRecord, Verdict};
+use crate::trial::{
+    JudgedBy, JumpRow, Overrides, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord,
+    Verdict, counted, four_digits, parameter_unit,
+};
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
 pub fn line(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) -> String {
@@ -69,6 +72,34 @@ pub fn origins(rows: &[TrialRecord]) -> String {
     let origins = [of(JudgedBy::Operator, "the operator"), of(JudgedBy::Rule, "a rule of the program")];
     let origins: Vec<String> = origins.into_iter().flatten().collect();
     if origins.is_empty() { String::new() } else { format!("Judged {}\n", origins.join("; ")) }
+}
+
+/// The numbers of trials whose values an operator has changed and of re-runs, without those that did not run; empty without either.
+pub fn interventions(rows: &[TrialRecord]) -> String {
+    let count = |source| rows.iter().filter(|row| row.source == source && !row.was_not_run()).count();
+    match (count(ProposalSource::Operator), count(ProposalSource::Rerun)) {
+        (0, 0) => String::new(),
+        (changed, reruns) => {
+            format!("{} with values that an operator has set, {}", counted(changed, "trial"), counted(reruns, "re-run"))
+        }
+    }
+}
+
+/// A line for each trial that ran with values in place of the proposed ones, `Trial 3 ran with Fx 100 N, proposed 63.55 N`.
+pub fn overrides(rows: &[TrialRecord]) -> String {
+    let mut text = String::new();
+    for row in rows {
+        let value = |p: &ProposedParameter| {
+            let unit = parameter_unit(&p.name);
+            format!("{} {} {unit}, proposed {} {unit}", p.name, four_digits(p.value), four_digits(p.proposed))
+        };
+        let values: Vec<String> = Overrides::default().of(row).iter().map(value).collect();
+        if !values.is_empty() {
+            let ran = if row.was_not_run() { "was set to" } else { "ran with" };
+            let _ = writeln!(text, "Trial {} {ran} {}", row.trial, values.join("; "));
+        }
+    }
+    text
 }
 
 /// Ascending numbers in words, three or more in a row by the first and the last: `0 to 2, 4, 5`.

@@ -219,6 +219,14 @@ pub struct Proposal {
     pub repeats: u32,
 }
 
+impl Proposal {
+    /// Returns the proposed values of the parameters and gains that have another one.
+    pub fn replaced(&self) -> ParameterValues {
+        let changed = self.parameters.iter().chain(&self.gains).filter(|p| p.value != p.proposed);
+        changed.map(|p| (p.name.clone(), p.proposed)).collect()
+    }
+}
+
 /// One value of a proposal.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProposedParameter {

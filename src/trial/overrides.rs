@@ -19,10 +19,17 @@ impl Overrides {
         };
     }
 
-    /// Returns those that a trial ran with.
-    pub fn of<'a>(&'a self, row: &'a TrialRecord) -> impl Iterator<Item = &'a ProposedParameter> {
-        let ran =
-            |p: &&ProposedParameter| row.parameters.get(&p.name).or_else(|| row.gains.get(&p.name)) == Some(p.value);
-        self.0.get(&row.trial).into_iter().flatten().filter(ran)
+    /// Returns those that a trial ran with: of the trial itself, or in a recording and a study of an earlier version those of its
+    /// proposal.
+    pub fn of(&self, row: &TrialRecord) -> Vec<ProposedParameter> {
+        let ran = |name: &str| row.parameters.get(name).or_else(|| row.gains.get(name));
+        if !row.proposed.is_empty() {
+            let own = |(name, proposed): &(String, f64)| {
+                Some(ProposedParameter { name: name.clone(), value: ran(name)?, proposed: *proposed })
+            };
+            return row.proposed.iter().filter_map(own).collect();
+        }
+        let of_proposal = self.0.get(&row.trial).into_iter().flatten();
+        of_proposal.filter(|p| ran(&p.name) == Some(p.value)).cloned().collect()
     }
 }

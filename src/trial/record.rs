@@ -45,6 +45,8 @@ pub struct TrialRecord {
     pub seed: Option<u64>,
     /// The ranges from which its parameters were drawn; empty in older recordings.
     pub ranges: Vec<DrawnRange>,
+    /// Proposed values of the parameters and gains that the operator has changed; empty in older recordings and journals.
+    pub proposed: ParameterValues,
 }
 
 /// Cause of a point that the operator took from the queue: its trial is void and never runs.

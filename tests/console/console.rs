@@ -31,6 +31,7 @@ mod guard;
 mod health_view;
 mod judged_by;
 mod judging;
+mod kept_overrides;
 mod keys;
 mod live_view;
 mod log_view;

@@ -144,7 +144,7 @@ fn a_queued_point_runs_next_and_points_of_a_table_can_be_queued() {
     assert!(program.text(&["study", "enqueue", &study, "Fx=77", "Fz=222.5"]).contains("trial 6"));
     drop(held);
     program.write("points.csv", "params_f0,params_Fx,params_Fz\n1.25,66,211\n");
-    assert!(program.text(&["study", "import", &study, "points.csv", "--queue"]).contains("1 points"));
+    assert!(program.text(&["study", "import", &study, "points.csv", "--queue"]).contains("1 point queued"));
     assert!(program.text(&["study", "show", &study]).contains("2 queued"));
     let trials = program.trials(&["optimize", "--resume", &study, "--trials", "8", "--json", "--record", "none"]);
     assert_eq!((&trials[0]["params"]["Fx"], &trials[0]["params"]["Fz"]), (&77.0.into(), &222.5.into()));

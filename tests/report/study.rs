@@ -11,8 +11,8 @@ use quadfrog::report::{study_page, table, text};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Tick;
 use quadfrog::trial::{
-    Approval, JudgedBy, JumpParameters, ParameterInfo, Proposal, ProposalSource, ProposedParameter, Task, TrialRecord,
-    Verdict,
+    Approval, JudgedBy, JumpParameters, ParameterInfo, Proposal, ProposalSource, ProposedParameter, SKIPPED, Task,
+    TrialRecord, Verdict,
 };
 
 /// Ticks from -0.2 s: on the ground until 0.3 s but for a lift of 5 ms at 0.1 s, in the air until 0.8 s, then landed.
@@ -144,6 +144,24 @@ fn the_best_so_far_is_left_out_before_the_first_counted_trial() {
     assert!(none.contains("Studies. 1 trial, 0 counted") && none.contains("No trial of forward"), "{none}");
     let one = shown(vec![row(0, Verdict::Accept, 0.5)]);
     assert!(one.contains("Best value so far") && !one.contains("trials\n"), "{one}");
+}
+
+/// Regression: no page said how many trials ran with changed values or were re-runs.
+#[test]
+fn the_page_counts_overrides_and_reruns_that_ran() {
+    let row =
+        |trial, source, cause: &str| TrialRecord { source, cause: cause.into(), ..row(trial, Verdict::Void, 0.0) };
+    let rows = vec![
+        row(0, ProposalSource::Operator, ""),
+        row(1, ProposalSource::Operator, SKIPPED),
+        row(2, ProposalSource::Rerun, ""),
+        row(3, ProposalSource::Rerun, ""),
+        row(4, ProposalSource::Sampler, ""),
+    ];
+    let shown = text::render(&study_page::summary(&study(0, rows)), 80);
+    assert!(shown.contains("1 trial with values that an operator has set, 2 re-runs."), "{shown}");
+    let shown = text::render(&study_page::summary(&study(0, vec![row(0, ProposalSource::Sampler, "")])), 80);
+    assert!(!shown.contains("re-run"), "{shown}");
 }
 
 /// Regressions: the table of the studies was split at 80 columns, and repeats that confirm the best were among the accepted.

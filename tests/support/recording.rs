@@ -313,6 +313,7 @@ impl Draw {
                 expected: self.option(Draw::expected),
                 gains: self.several(|d| (d.string(), d.number())).into(),
                 seed: self.option(Draw::word),
+                proposed: self.several(|d| (d.string(), d.number())).into(),
                 ranges: self.several(|d| DrawnRange { name: d.string(), low: d.number(), high: d.number() }),
                 repeats: self.several(|d| RepeatRecord {
                     seed: d.word(),

@@ -1,5 +1,6 @@
-//! User attributes of a study and of its trials in the journal, as typed data (`docs/journal.md`). They hold everything
-//! that a later session needs. An attribute of another program, or of another type, is ignored.
+//! User attributes of the trials of a study in the journal, as typed data (`docs/journal.md`). With those of the study
+//! (`study_attributes.rs`) they hold everything that a later session needs. An attribute of another program, or of another type, is
+//! ignored.
 
 use std::collections::BTreeMap;
 
@@ -9,106 +10,16 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::plan::ExperimentPlan;
-use crate::optimize::ask::{SamplerConfig, SamplerKind};
+use crate::optimize::ask::SamplerKind;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
     Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, JudgedBy, MeasuredJump, ParameterInfo, ParameterValues,
-    Proposal, ProposalSource, RepeatRecord, Task, TrialRecord, Verdict, is_changed_verdict,
+    Proposal, ProposalSource, RepeatRecord, TrialRecord, Verdict, is_changed_verdict,
 };
 
 /// Attributes in the order in which they are written.
 pub type Attributes = Vec<(String, Value)>;
-
-/// Attributes of a study that was made by this program.
-#[derive(Debug, Serialize)]
-pub struct NewStudyAttributes<'a> {
-    pub task: Task,
-    pub robot: &'a str,
-    pub seed: u32,
-    pub sampler: &'a SamplerConfig,
-    pub version: &'static str,
-    pub budget: u32,
-    pub backend: &'a str,
-    /// Unit of the objective; none for that of the task.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub unit: Option<&'static str>,
-}
-
-/// The sampler with which a study was continued last.
-#[derive(Debug, Serialize)]
-pub struct SamplerAttribute<'a> {
-    pub sampler: &'a SamplerConfig,
-}
-
-/// The backend on which a study was continued last.
-#[derive(Debug, Serialize)]
-pub struct BackendAttribute {
-    pub backend: &'static str,
-}
-
-/// The budget of a study, for workers that join it and sessions that continue it.
-#[derive(Debug, Serialize)]
-pub struct BudgetAttribute {
-    pub budget: u32,
-}
-
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(default)]
-pub struct StudyAttributes {
-    pub task: Option<Task>,
-    pub robot: Option<String>,
-    pub seed: Option<u32>,
-    pub budget: Option<u32>,
-    /// Unit of the objective; none for that of the task.
-    pub unit: Option<String>,
-    /// The backend on which it was made or continued last; none for a study of an earlier version, which was simulated.
-    pub backend: Option<String>,
-    /// Bounds that the operator has changed, `{"Fx": [40, 110]}`.
-    pub bounds: Option<BTreeMap<String, [f64; 2]>>,
-    /// Fixed parameters, `{"Fx": {"value": 60, "trials": 5, "from": 12}}`.
-    pub fixed: Option<BTreeMap<String, FixedFrom>>,
-    /// The confirmation that runs; null when it is over.
-    pub confirm: Option<RunningConfirmation>,
-    pub confirmed: Option<Conclusion>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FixedFrom {
-    pub value: f64,
-    /// Number of trials.
-    pub trials: u32,
-    /// Number of the first trial.
-    pub from: u32,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunningConfirmation {
-    /// First trials of the compared points.
-    pub trials: Vec<u32>,
-    /// Most repeats.
-    pub repeats: u32,
-    /// Number of the first trial that may be one of them.
-    pub from: u32,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Conclusion {
-    /// First trials of the compared points.
-    pub trials: Vec<u32>,
-    /// First trial of the leading point.
-    pub leader: u32,
-    /// Confidence that the leading point is the best.
-    pub confidence: f64,
-    /// Whether the confidence is enough.
-    pub sure: bool,
-}
-
-impl StudyAttributes {
-    pub fn of(attributes: &BTreeMap<String, Value>) -> StudyAttributes {
-        read(attributes)
-    }
-}
 
 /// Origin of a trial; kept with a queued trial. Without attributes the trial was queued by another program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -200,6 +111,9 @@ pub struct BeganAttributes {
     expected: Option<ExpectedResult>,
     #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
     fixed: ParameterValues,
+    /// Proposed values of the parameters and gains that the operator has changed.
+    #[serde(skip_serializing_if = "is_empty", serialize_with = "as_object")]
+    proposed: ParameterValues,
     /// Coulomb coefficient of the ground; none where it is not drawn for each trial.
     #[serde(skip_serializing_if = "Option::is_none")]
     friction: Option<f64>,
@@ -234,6 +148,7 @@ impl BeganAttributes {
             risk: proposal.risk,
             expected: proposal.expected,
             fixed,
+            proposed: proposal.replaced(),
             friction: drawn.map(|terrain| terrain.friction_of(seed)),
         }
     }
@@ -313,6 +228,9 @@ pub struct TrialAttributes {
     /// Parameters that the operator had fixed for some trials.
     #[serde(deserialize_with = "numbers")]
     pub fixed: ParameterValues,
+    /// Proposed values of the parameters and gains that the operator has changed; empty in journals of earlier versions.
+    #[serde(deserialize_with = "numbers")]
+    pub proposed: ParameterValues,
     pub verdict: Option<Verdict>,
     /// Origin of the verdict; none for a trial of an earlier version.
     pub judged_by: Option<JudgedBy>,
@@ -393,6 +311,9 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     };
     // A point that was removed from the queue was never begun: it has the values that were given.
     let given = trial.fixed();
+    // As the gains above.
+    let names = order.iter().map(|p| p.name.as_str()).chain(GAIN_UNITS.iter().map(|(name, _)| *name));
+    let proposed = names.filter_map(|name| Some((name.to_owned(), kept.proposed.get(name)?))).collect();
     let parameter = |name: &str| trial.parameter(name).or_else(|| value_of(&given, name));
     // A verdict that can still be taken back has its value already.
     let judged = trial.state == TrialState::Running && matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall));
@@ -407,7 +328,7 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         source: if elsewhere && trial.state != TrialState::Waiting { ProposalSource::OtherProgram } else { source },
         parent,
         parameters: order.iter().filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect(),
-        measured: parse(&trial.user_attributes, |_| true),
+        measured: parse(&trial.user_attributes, &|_| true),
         value: trial.value.or(kept.value.filter(|_| judged)),
         hand_value: kept.hand_value,
         suggested: kept.suggested,
@@ -416,11 +337,12 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
         judged_by: verdict.and(changed.or(kept.judged_by)),
         note,
         risk: kept.risk,
-        expected: parse(&trial.user_attributes, |_| true),
+        expected: parse(&trial.user_attributes, &|_| true),
         gains,
         repeats,
         seed,
         ranges: ranges_of(trial),
+        proposed,
     }
 }
 
@@ -435,15 +357,17 @@ pub fn ranges_of(trial: &Trial) -> Vec<DrawnRange> {
 }
 
 /// Reads attributes; those of another type are left out.
-fn read<T: DeserializeOwned + Default>(attributes: &BTreeMap<String, Value>) -> T {
-    let fits = |name: &str| parse::<T>(attributes, |other| other == name).is_some();
-    parse(attributes, |_| true).or_else(|| parse(attributes, fits)).unwrap_or_default()
+pub(super) fn read<T: DeserializeOwned + Default>(attributes: &BTreeMap<String, Value>) -> T {
+    let fits = |name: &str| parse::<T>(attributes, &|other| other == name).is_some();
+    parse(attributes, &|_| true).or_else(|| parse(attributes, &fits)).unwrap_or_default()
 }
 
-/// Reads the attributes whose names are `kept`; none if one is missing or of another type.
-fn parse<T: DeserializeOwned>(attributes: &BTreeMap<String, Value>, kept: impl Fn(&str) -> bool) -> Option<T> {
+/// Reads the attributes whose names are `kept`; none if one is missing or of another type. It has one form for each type: the
+/// compiled form is long.
+fn parse<T: DeserializeOwned>(attributes: &BTreeMap<String, Value>, kept: &dyn Fn(&str) -> bool) -> Option<T> {
     let pairs = attributes.iter().map(|(name, value)| (name.as_str(), value)).filter(|(name, _)| kept(name));
-    T::deserialize(MapDeserializer::<_, serde_json::Error>::new(pairs)).ok()
+    let pairs: Vec<(&str, &Value)> = pairs.collect();
+    T::deserialize(MapDeserializer::<_, serde_json::Error>::new(pairs.into_iter())).ok()
 }
 
 /// Returns the fields of `attributes` in their order; a [`Value`] would sort them.

@@ -4,7 +4,8 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::attributes::{self, Conclusion, RunningConfirmation, StudyAttributes};
+use super::attributes;
+use super::study_attributes::{Conclusion, RunningConfirmation, StudyAttributes};
 use crate::optimize::ask::Direction;
 use crate::optimize::repeats::{self, Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
 use crate::optimize::study::{Study, StudyError};

@@ -20,6 +20,7 @@ mod queue;
 mod queue_changes;
 mod repeats;
 mod search;
+pub(crate) mod study_attributes;
 mod trial_changes;
 mod verdict_change;
 

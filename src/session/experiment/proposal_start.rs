@@ -213,6 +213,7 @@ impl Experiment {
             repeats: origin.repeats,
             seed: Some(seed),
             ranges: self.study.trial(number).map(attributes::ranges_of).unwrap_or_default(),
+            proposed: proposal.replaced(),
             ..judged
         };
         if !row.note.is_empty() {

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::attributes::{self, Attributes, FixedFrom, StudyAttributes, TrialAttributes};
+use super::attributes::{self, Attributes, TrialAttributes};
 use super::plan::ExperimentPlan;
+use super::study_attributes::{FixedFrom, StudyAttributes};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};

@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use super::attributes::{self, BudgetAttribute, Origin};
+use super::attributes::{self, Origin};
 use super::changes::Changes;
 use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
+use super::study_attributes::BudgetAttribute;
 use super::{Experiment, ExperimentState, confirmation, envelope};
 use crate::trial::{FixedParameter, ParameterInfo, ParameterValues, ProposalSource, QueuedPoint, six_digits};
 

@@ -329,6 +329,7 @@ pub fn trial(number: u32, verdict: Option<Verdict>, suggested: Option<Verdict>) 
         repeats: Vec::new(),
         seed: None,
         ranges: Vec::new(),
+        proposed: Vec::new().into(),
     }
 }
 

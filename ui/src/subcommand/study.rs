@@ -242,6 +242,11 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         None => table::other_program(study.trials(), best),
     };
     text += &table::origins(&rows);
+    let interventions = table::interventions(&rows);
+    if !interventions.is_empty() {
+        let _ = writeln!(text, "{interventions}");
+    }
+    text += &table::overrides(&rows);
     let not_run = rows.iter().filter(|row| row.was_not_run()).count();
     if not_run > 0 {
         let proposals = counted(not_run, "proposal");

@@ -16,8 +16,9 @@ pub fn details(
     trial: &TrialRecord,
     overrides: &Overrides,
 ) -> Vec<(String, String)> {
+    let overrides = overrides.of(trial);
     let proposed = |name: &str| {
-        let overridden = overrides.of(trial).find(|p| p.name == name);
+        let overridden = overrides.iter().find(|p| p.name == name);
         overridden.map_or(String::new(), |p| format!(", overridden; proposed {}", four_digits(p.proposed)))
     };
     let unit = &session.info.unit;
