@@ -106,6 +106,19 @@ fn a_key_that_the_defaults_leave_out_may_be_given() {
 }
 
 #[test]
+fn several_jumps_in_a_row_are_to_stand_more_surely_unless_the_key_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let least = |config: &Config, task| config.sampler(task).least_p_stand;
+    fs::write(folder.path().join("control.toml"), "[tasks.forward]\njumps = 3\nf1_hz = 1.0\n").unwrap();
+    let config = Config::load(Some(folder.path())).unwrap();
+    assert_eq!((least(&config, Task::Forward), least(&config, Task::TwistCcw)), (Some(0.85), None));
+    fs::write(folder.path().join("optimize.toml"), "[sampler]\nleast_p_stand = 0.9\n").unwrap();
+    let config = Config::load(Some(folder.path())).unwrap();
+    assert_eq!((least(&config, Task::Forward), least(&config, Task::TwistCcw)), (Some(0.9), Some(0.9)));
+    refuses("optimize.toml", "[sampler]\nleast_p_stand = 1.0\n", &["sampler.least_p_stand", "0.99"]);
+}
+
+#[test]
 fn an_unknown_key_is_refused_with_line_and_nearest_key() {
     refuses(
         "control.toml",

@@ -233,6 +233,7 @@ const OPTIMIZE: &[Row] = &[
     (&["trials"], within!(1, 1e6, "trials")),
     (&["sampler.candidates"], within!(1, 10000, "points")),
     (&["sampler.startup_trials"], within!(0, 1e6, "trials")),
+    (&["sampler.least_p_stand"], within!(0, 0.99)),
     (&["sampler.seed"], within!(0, 4294967295.0)),
     (&["workers.abandoned_s"], within!(0.1, 604800, "s")),
     (&["confirm.contenders"], within!(2, 10, "points")),

@@ -29,7 +29,7 @@ pub struct SectionReference {
     pub table: String,
     /// Its comments: all that are not of one key.
     pub comment: String,
-    /// Its keys in their order.
+    /// Its keys in their order, also those without a default.
     pub keys: Vec<KeyReference>,
 }
 
@@ -38,8 +38,8 @@ pub struct SectionReference {
 pub struct KeyReference {
     /// Its name.
     pub name: String,
-    /// Its default.
-    pub default: Value,
+    /// Its default; none for a key that the file has as a comment, `# trials = 10`.
+    pub default: Option<Value>,
     /// Range of its numbers on every backend; none if it holds none.
     pub range: Option<&'static NumberRange>,
     /// Narrower range on hardware; none where the same range holds.
@@ -77,7 +77,8 @@ fn file_reference(name: &'static str, text: &'static str) -> FileReference {
     // Whether a line with an indented comment continues the comment of a key, or of a table.
     let mut of_key = false;
     for line in text.lines() {
-        let (code, comment) = split_comment(line);
+        let commented = line.strip_prefix("# ").filter(|code| is_key(code));
+        let (code, comment) = split_comment(commented.unwrap_or(line));
         let last = file.sections.len() - 1;
         let section = &mut file.sections[last];
         if code.is_empty() {
@@ -101,7 +102,11 @@ fn file_reference(name: &'static str, text: &'static str) -> FileReference {
         } else if let Some((key, _)) = code.split_once('=') {
             let key = key.trim().trim_matches('"').to_owned();
             let path = if section.table.is_empty() { key.clone() } else { format!("{}.{key}", section.table) };
-            let Some(default) = lookup(&values, &path).cloned() else { continue };
+            let default = lookup(&values, &path).cloned();
+            // A commented key may repeat another one as an example.
+            if default.is_some() == commented.is_some() {
+                continue;
+            }
             let (range, hardware_range) = ranges::of_key(name, &path);
             let mut found = KeyReference { name: key, default, range, hardware_range, comment: String::new() };
             append(&mut found.comment, &std::mem::take(&mut above));
@@ -113,6 +118,11 @@ fn file_reference(name: &'static str, text: &'static str) -> FileReference {
     let last = file.sections.len() - 1;
     append(&mut file.sections[last].comment, &above);
     file
+}
+
+/// Whether the text of a comment is a key with a value, `trials = 10 # of a study`, or a table.
+fn is_key(comment: &str) -> bool {
+    split_comment(comment).0.parse::<Table>().is_ok_and(|table| !table.is_empty())
 }
 
 /// Returns the code of a line and its comment, without `#`.

@@ -154,6 +154,28 @@ fn values_tell_where_the_robot_stands() {
     assert!(strong - weak > 0.2, "{weak} {strong}");
 }
 
+/// A proposal that is worth its risk stands at least as surely as the key asks.
+#[test]
+fn proposals_stand_as_surely_as_the_key_asks() {
+    let proposals = |least_p_stand: Option<f64>| -> Vec<Expectation> {
+        let mut study = in_memory(options(space(), SamplerConfig { least_p_stand, ..sampler(SamplerKind::Sim, 0) }));
+        study.use_prior(RIGHT.clone());
+        let next = |_| {
+            let expected = study.draft().expected.unwrap();
+            jump(&mut study, &ROBOT);
+            expected
+        };
+        (0..5).map(next).collect()
+    };
+    for least in [0.0, 0.75, 0.85] {
+        let worth: Vec<Expectation> = proposals(Some(least)).into_iter().filter(|e| e.worth_the_risk).collect();
+        println!("asked {least}: {:.3?}", worth.iter().map(|e| e.p_stand).collect::<Vec<_>>());
+        assert!(!worth.is_empty() && worth.iter().all(|e| e.p_stand >= least), "{worth:?}, asked {least}");
+    }
+    assert_eq!(proposals(Some(0.75)), proposals(None));
+    assert_ne!(proposals(Some(0.85)), proposals(None));
+}
+
 /// After 10 jumps within 10 % of `gp`, whose first points are free of the simulator.
 #[test]
 fn a_mirrored_simulator_is_left_for_the_values_that_contradict_it() {

@@ -16,10 +16,9 @@ const PRICE: f64 = 0.05;
 const ESCALATION: f64 = 10.0;
 /// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
 const INCUMBENT: f64 = 0.5;
-/// Probability of standing below which no gain is worth the risk.
-const LEAST: f64 = 0.75;
-/// Probability of standing from which a point is sure enough to be proposed where no gain is worth its risk.
-const SURE: f64 = 0.85;
+/// Probability of a fall of a point that is sure enough to be proposed where no gain is worth its risk, as a share of the largest that
+/// is accepted.
+const SURE: f64 = 0.6;
 /// Smallest J*, in scaled units.
 const LEAST_STAR: f64 = 1e-3;
 /// Half widths of the local rounds, as shares of the box.
@@ -58,6 +57,8 @@ pub struct Acquisition<'a> {
     origin: f64,
     /// 10^c for c falls in a row.
     escalation: f64,
+    /// Probability of standing below which no gain is worth a jump.
+    least: f64,
     void: Vec<Vec<f64>>,
 }
 
@@ -68,7 +69,7 @@ enum Reason {
     Unsure,
     /// It stands, and its gain is not worth its risk: the one that may be the highest is the best.
     Sure,
-    /// Its gain is worth its risk: U > 0 and P >= [`LEAST`].
+    /// Its gain is worth its risk: U > 0, and P is large enough.
     Gain,
 }
 
@@ -103,12 +104,14 @@ impl Scored {
 }
 
 impl<'a> Acquisition<'a> {
-    /// Computes incumbent and price from the fitted models. `candidates` count for J* before the first jump that stood.
+    /// Computes incumbent and price from the fitted models. `candidates` count for J* before the first jump that stood; `least` is the
+    /// probability of standing below which no gain is worth a jump.
     pub fn new(
         (prior, ensemble): (&'a Prior, &'a Ensemble),
         (value, standing): (ValueModel, StandingModel),
         history: &History,
         candidates: &[(Vec<f64>, Features)],
+        least: f64,
     ) -> Option<Self> {
         let origin = (ensemble.lowest.min(0.0) - ensemble.offset) / ensemble.scale;
         let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, f));
@@ -127,7 +130,7 @@ impl<'a> Acquisition<'a> {
         let value = value.believing(&history.pending)?;
         let escalation = pow(ESCALATION, history.falls_in_a_row() as f64);
         let (star, void) = (star.max(LEAST_STAR), history.void.clone());
-        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, escalation, void })
+        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, escalation, least, void })
     }
 
     /// Predicts at a point with its terms.
@@ -148,9 +151,9 @@ impl<'a> Acquisition<'a> {
             Some(incumbent) => exp(log(deviation) + log_improvement((mean - incumbent) / deviation)),
         };
         let utility = p_stand * gain - PRICE * self.escalation * self.star * (1.0 - p_stand);
-        let (reason, merit) = if utility > 0.0 && p_stand >= LEAST {
+        let (reason, merit) = if utility > 0.0 && p_stand >= self.least {
             (Reason::Gain, utility)
-        } else if p_stand >= SURE {
+        } else if 1.0 - p_stand <= SURE * (1.0 - self.least) {
             (Reason::Sure, (mean + deviation - self.origin).max(0.0))
         } else {
             (Reason::Unsure, p_stand)

@@ -46,10 +46,14 @@ fn write_section(page: &mut String, section: &SectionReference) {
     }
     page.push_str("\n| key | default | range | on hardware | meaning |\n|---|---|---|---|---|\n");
     for KeyReference { name, default, range, hardware_range, comment } in &section.keys {
-        let range = if default.is_bool() { "true or false".to_owned() } else { in_words(*range) };
+        let of_bool = default.as_ref().is_some_and(|default| default.is_bool());
+        let range = if of_bool { "true or false".to_owned() } else { in_words(*range) };
         let hardware = in_words(*hardware_range);
-        let default = default.to_string().replace('|', "\\|");
-        let _ = writeln!(page, "| `{name}` | `{default}` | {range} | {hardware} | {} |", escaped(comment));
+        let default = match default {
+            Some(default) => format!("`{}`", default.to_string().replace('|', "\\|")),
+            None => "left out".to_owned(),
+        };
+        let _ = writeln!(page, "| `{name}` | {default} | {range} | {hardware} | {} |", escaped(comment));
     }
 }
 

@@ -21,7 +21,9 @@ pub fn schema(file: &FileReference) -> Json {
         for key in &section.keys {
             let path =
                 if section.table.is_empty() { key.name.clone() } else { format!("{}.{}", section.table, key.name) };
-            *member(place, &key.name, || Json::Null) = of_key(file, &path, key);
+            if let Some(schema) = of_key(file, &path, key) {
+                *member(place, &key.name, || Json::Null) = schema;
+            }
         }
     }
     add_optional(file, &mut root, "", &file.optional);
@@ -49,16 +51,19 @@ fn member<'a>(table: &'a mut Json, name: &str, new: impl FnOnce() -> Json) -> &'
     properties.entry(name).or_insert_with(new)
 }
 
-fn of_key(file: &FileReference, path: &str, key: &KeyReference) -> Json {
-    let mut schema = of_value(file, path, &key.default, key.range);
-    schema["default"] = json!(key.default);
+/// Returns the schema of a key; none for a comment that only looks like a key.
+fn of_key(file: &FileReference, path: &str, key: &KeyReference) -> Option<Json> {
+    let mut schema = of_value(file, path, &example(file, path)?, key.range);
+    if let Some(default) = &key.default {
+        schema["default"] = json!(default);
+    }
     let hardware = key.hardware_range.map(|range| format!("On hardware it {}.", range.text)).unwrap_or_default();
     let comment = [key.comment.as_str(), &hardware].iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>();
     describe(&mut schema, &comment.join(" "));
-    schema
+    Some(schema)
 }
 
-/// Adds the keys that the defaults leave out, with the kinds of their examples.
+/// Adds the other keys that the defaults leave out, with the kinds of their examples.
 fn add_optional(file: &FileReference, place: &mut Json, tables: &str, optional: &Table) {
     for (name, example) in optional {
         let path = format!("{tables}{name}");
@@ -72,7 +77,7 @@ fn add_optional(file: &FileReference, place: &mut Json, tables: &str, optional: 
             }
             value => {
                 let range = quadfrog::config::range_of(file.name, &path);
-                *member(place, name, || Json::Null) = of_value(file, &path, value, range);
+                member(place, name, || of_value(file, &path, value, range));
             }
         }
     }
