@@ -165,11 +165,18 @@ fn places_are_typed_as_times_seconds_and_trials() {
     // Regression: the help names the form "75.5 s", which was refused.
     go(&mut session, "7.5s", "00:07.500");
     go(&mut session, "#3", &shown(span(3).begin_ns));
+    // Regression: the hint named the form "trial #7", of which the space vanished before it was refused.
+    for place in ["trial #3", "trial 3", "# 3", "trial3"] {
+        go(&mut session, "7.5 s", "00:07.500");
+        go(&mut session, place, &shown(span(3).begin_ns));
+    }
     for (place, problem) in [
         ("99:00", "is after the end"),
         ("soon", "`soon` is no place"),
         ("1:75", "is no place"),
         ("#77", "trial 77 is not in"),
+        ("trial 77", "trial 77 is not in"),
+        ("trial x", "`trial x` is not the number of a trial"),
     ] {
         session.send(&format!("G{place}\r"));
         session.wait_for(&[problem]);

@@ -170,11 +170,11 @@ fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
     console.update(Msg::Replay(ReplayStatus::default()));
     console.press(&["G", "?"]);
     let screen = console.screen(80, 24);
-    assert_shows(&screen, &["`?` does not belong here: a time, a trial as #7, best or fall is typed"]);
+    assert_shows(&screen, &["`?` does not belong here: a time, #7 for a trial, best or fall is typed"]);
     console.press(&["Enter"]);
-    assert_shows(&console.screen(80, 24), &["a time, a trial as #7, best or fall is typed; Esc"]);
+    assert_shows(&console.screen(80, 24), &["a time, #7 for a trial, best or fall is typed; Esc"]);
     assert_eq!(console.press(&["Enter"]), []);
-    assert_shows(&console.screen(80, 24), &["nothing was typed: 12:34, 75.5 (seconds), #7 (a trial), best or"]);
+    assert_shows(&console.screen(80, 24), &["nothing was typed: a time, #7 for a trial, best or fall is needed"]);
 }
 
 /// Regression: of a word the field took the letters of `best` alone and then said that nothing was typed; `fall` was refused.
@@ -183,10 +183,10 @@ fn a_word_that_is_no_place_in_a_recording_is_named() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus::default()));
     console.press(&["G"]);
-    assert_shows(&console.screen(80, 24), &["trial #7, best of the recording, fall"]);
+    assert_shows(&console.screen(80, 24), &["12:34, 1:02:03.5, 75.5 s, #7 or trial 7, best of the recording, fall"]);
     console.enter("worst");
     assert_eq!(console.press(&["Enter"]), []);
-    assert_shows(&console.screen(80, 24), &["`worst` is no place; write 12:34, 75.5 (seconds), #7 (a trial), best"]);
+    assert_shows(&console.screen(80, 24), &["`worst` is no place; write 12:34, 75.5 s, #7 or trial 7, best or fall"]);
     // The refused word is selected: the next one replaces it.
     console.enter("fall");
     assert_eq!(console.press(&["Enter"]), [Effect::Replay(ReplayCommand::NextFall)]);

@@ -226,7 +226,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Faster, "faster", &[">"], G::Replay, "twice the speed"),
         row(A::PreviousMarker, "previous-marker", &["["], G::Replay, "to the previous trial or fault"),
         row(A::NextMarker, "next-marker", &["]"], G::Replay, "to the next trial or fault"),
-        row(A::Seek, "go-to", &["G"], G::Replay, "to a time, 12:34 or 75.5 s, a trial, #7, best or fall"),
+        row(A::Seek, "go-to", &["G"], G::Replay, "to a time, 12:34 or 75.5 s, a trial, #7 or trial 7, best or fall"),
         row(A::PreviousFall, "previous-fall", &["{"], G::Replay, "to the previous fall or fault"),
         row(A::NextFall, "next-fall", &["}"], G::Replay, "to the next fall or fault"),
         row(A::ReplayStart, "replay-start", &["("], G::Replay, "to the start"),

@@ -157,7 +157,12 @@ pub enum Purpose {
 /// End of the message about a character that is not part of a number.
 pub const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
 /// End of the message about a character that is not part of a place in a recording.
-pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, a trial as #7, best or fall is typed";
+pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, #7 for a trial, best or fall is typed";
+
+/// The places in a recording that can be typed; without a space where Space is STOP.
+pub fn places(space_is_text: bool) -> &'static str {
+    if space_is_text { "12:34, 75.5 s, #7 or trial 7, best or fall" } else { "12:34, 75.5, #7, best or fall" }
+}
 
 /// Whether a message of a form is about a character that was not taken. It stays until it is acknowledged: 1.5 would become 15 unseen.
 pub fn is_refused_character(message: &str) -> bool {
@@ -176,7 +181,7 @@ impl Purpose {
             Purpose::HandValue(_) | Purpose::Bounds { .. } => Some("0123456789.,+-e"),
             Purpose::Continue | Purpose::Fix { .. } | Purpose::ConfirmBest | Purpose::TrialNumber => Some("0123456789"),
             Purpose::Beside => Some("0123456789#"),
-            Purpose::Seek => Some("0123456789.,:#abcdefghijklmnopqrstuvwxyz"),
+            Purpose::Seek => Some("0123456789.,:# abcdefghijklmnopqrstuvwxyz"),
             Purpose::Note(_)
             | Purpose::VoidReason { .. }
             | Purpose::ChangeVerdict { .. }
@@ -192,7 +197,7 @@ impl Purpose {
             Purpose::ConfirmBest => Some("a number of repeats from 1 to 1000"),
             Purpose::Bounds { .. } => Some("a range as 50..120"),
             Purpose::TrialNumber | Purpose::Beside => Some("the number of a trial"),
-            Purpose::Seek => Some("12:34, 75.5 (seconds), #7 (a trial), best or fall"),
+            Purpose::Seek => Some("a time, #7 for a trial, best or fall"),
             Purpose::HandValue(_)
             | Purpose::Note(_)
             | Purpose::VoidReason { .. }
@@ -238,9 +243,10 @@ impl Dialog {
         }
     }
 
-    /// Whether a space is text here: not where a number is typed.
-    pub fn takes_spaces(&self) -> bool {
+    /// Whether a space is text here: not where a number is typed, and in a place of a recording unless Space stops a robot.
+    pub fn takes_spaces(&self, can_stop: bool) -> bool {
         match self {
+            Dialog::Field { purpose: Purpose::Seek, .. } => !can_stop,
             Dialog::Field { purpose, .. } => purpose.characters().is_none(),
             Dialog::Palette { .. } => true,
             _ => false,

@@ -333,7 +333,7 @@ impl Model {
 
     /// Whether Space is text: a text field is open in which a space has a meaning.
     pub fn space_bar_is_text(&self) -> bool {
-        self.dialog.as_ref().is_some_and(Dialog::takes_spaces) && !self.space_bar_must_stop()
+        self.dialog.as_ref().is_some_and(|dialog| dialog.takes_spaces(self.can_stop())) && !self.space_bar_must_stop()
     }
 
     /// Whether Space is STOP in a text field, too.

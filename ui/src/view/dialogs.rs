@@ -332,7 +332,10 @@ fn field(
             )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
-        Purpose::Seek => "12:34, 1:02:03.5, seconds 75.5, trial #7, best of the recording, fall".to_owned(),
+        Purpose::Seek if model.space_bar_is_text() => {
+            "12:34, 1:02:03.5, 75.5 s, #7 or trial 7, best of the recording, fall".to_owned()
+        }
+        Purpose::Seek => "12:34, 1:02:03.5, 75.5, #7, best of the recording, fall".to_owned(),
         Purpose::Rejudge => "a folder as for --config; empty: the defaults; the file is not changed".to_owned(),
         Purpose::Beside => match model.timeline.as_ref().and_then(|timeline| timeline.second.as_ref()) {
             Some(second) => format!("its number in {}", second.name),

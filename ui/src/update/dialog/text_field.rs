@@ -11,6 +11,7 @@ use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
 use crate::model::dialog::{
     Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question, acknowledges_refused_character, is_refused_character,
+    places,
 };
 use crate::update::beside::chosen;
 use crate::update::rejudged;
@@ -164,7 +165,8 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
             false => Err(format!("the best is trial {best}, which is not in this recording")),
         };
     }
-    if let Some(number) = text.strip_prefix('#') {
+    let named = text.strip_prefix("trial").map(|rest| rest.trim_start().trim_start_matches('#'));
+    if let Some(number) = named.or(text.strip_prefix('#')) {
         let trial =
             number.trim().parse().map_err(|_| format!("`{text}` is not the number of a trial; write it as #7"))?;
         let known = model.timeline.as_ref().is_some_and(|timeline| timeline.has_ticks_of(trial));
@@ -178,7 +180,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
             })
         };
     }
-    let refused = || format!("`{text}` is no place; write 12:34, 75.5 (seconds), #7 (a trial), best or fall");
+    let refused = || format!("`{text}` is no place; write {}", places(!model.can_stop()));
     let mut time_s = 0.0;
     let parts: Vec<&str> = text.strip_suffix('s').unwrap_or(text).split(':').collect();
     for (index, part) in parts.iter().enumerate() {
