@@ -28,14 +28,15 @@ const ENGINE: [(&str, &[&str]); 13] = [
 ];
 
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
-const CONSOLE: [&[&str]; 11] = [
+const CONSOLE: [&[&str]; 12] = [
     &["action", "cell_encoder", "column", "series", "connection", "wrap"],
     &["keymap", "output", "theme"],
     &["graphics"],
     &["settings", "message"],
     &["model"],
-    &["layout", "text"],
+    &["layout", "text", "draw"],
     &["legal"],
+    &["arming", "help"],
     &["update", "view", "feed", "export", "terminal", "input"],
     &["picture"],
     &["app", "screenshot"],

@@ -63,6 +63,7 @@ mod safe_handling;
 mod samples;
 mod screens;
 mod screenshot;
+mod scrolling;
 mod search;
 mod stop_keys;
 mod study_command;

@@ -15,7 +15,7 @@ const SENTENCE: &str = "no person within 2 m of the robot, the remote control in
                         combination known to everybody who is in the room and who has read the page on safe handling";
 
 /// Every check with a long sentence, as hardware has them.
-fn long_checks() -> Console {
+pub fn long_checks() -> Console {
     let mut console = Console::proposed();
     console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
     let item = |check: &ArmingCheck| ArmingCheckRecord {
@@ -289,11 +289,11 @@ fn lists_say_how_long_they_are_and_that_nothing_matches() {
     assert_shows(&console.screen(80, 24), &["no action matches"]);
     console.press(&["Esc", "T"]);
     let screen = console.screen(80, 24);
-    assert_shows(&screen, &["Series of the charts (1-", "Up Down)"]);
+    assert_shows(&screen, &["Series of the charts (1-", "Up Down Home End)"]);
     console.press(&["End"]);
     assert!(!console.screen(80, 24).contains("(1-"), "{}", console.screen(80, 24));
     console.press(&["Esc", "?"]);
-    assert_shows(&console.next_step(), &["Up Down PgUp PgDn scroll, Esc Enter q close."]);
+    assert_shows(&console.next_step(), &["Up Down PgUp PgDn Home End scroll, Esc Enter q close."]);
 }
 
 #[test]
@@ -341,9 +341,9 @@ fn the_queue_of_a_replay_offers_no_key_that_is_refused() {
     let point = QueuedPoint { trial: 3, source: ProposalSource::Operator, ..QueuedPoint::default() };
     console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
     console.press(&["N"]);
-    assert_shows(&console.next_step(), &["Left earlier, Right later, x removes"]);
+    assert_shows(&console.next_step(), &["Left Right move it, x removes"]);
     console.update(Msg::Replay(ReplayStatus::default()));
-    assert_eq!(console.next_step(), "Up Down choose, Esc Enter q close.");
+    assert_eq!(console.next_step(), "Up Down Home End choose, Esc Enter q close.");
 }
 
 /// Regression: the list of actions did not page, and nothing said that it goes on.
@@ -382,7 +382,7 @@ fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
     let point = QueuedPoint { trial: 3, source: ProposalSource::Operator, ..QueuedPoint::default() };
     console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
     assert_eq!(console.press(&["z"]), []);
-    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down Left Right x Esc Enter q do"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down Left Right Home End x Esc Enter q do"]);
     console.press(&["Esc", "o", "Home"]);
     let keys = "a number, arrows, PgUp PgDn, Enter, Q and Esc do";
     assert_shows(&console.screen(80, 24), &[&format!("Home does nothing here; {keys}")]);
@@ -398,7 +398,7 @@ fn a_key_without_a_meaning_is_answered_with_the_keys_that_work() {
 fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
     let mut console = Console::proposed();
     for (view, open, keys) in [
-        ("1", "P", "Up Down PgUp PgDn Esc Enter q do"),
+        ("1", "P", "Up Down PgUp PgDn Home End Esc Enter q do"),
         ("1", "T", "Up Down PgUp PgDn Home End x Esc Enter q do"),
         ("2", "x", "Up Down PgUp PgDn Home End x Esc Enter q do"),
     ] {
@@ -408,7 +408,7 @@ fn a_key_without_a_meaning_is_answered_in_the_checks_and_in_the_lists() {
     }
     console.model.session.info = SessionInfo { backend: Some(Backend::Hardware), ..session() };
     assert_eq!(console.requests(&["P", "z"]), []);
-    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down x PgUp PgDn Esc Enter q do"]);
+    assert_shows(&console.screen(80, 24), &["z does nothing here; Up Down x PgUp PgDn Home End Esc Enter q do"]);
     // Arming that is refused has its reason.
     console.mode(Mode::Ready);
     assert_eq!(console.requests(&["A"]), []);

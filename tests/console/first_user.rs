@@ -193,8 +193,11 @@ fn the_step_of_a_dialog_over_a_stop_has_whole_keys() {
     }));
     console.mode_of_ticks(Mode::Damped);
     let last = |columns| console.screen(columns, 24).lines().last().unwrap_or_default().to_owned();
-    assert_eq!(last(80), " STOPPED: k acknowledges. Up Down other trials, Esc Enter q close.");
-    assert_eq!(last(100), " STOPPED: k acknowledges. Up Down other trials, PgUp PgDn scroll, Esc Enter q close.");
+    assert_eq!(last(80), " STOPPED: k acknowledges. Up Down Home End other trials, Esc Enter q close.");
+    assert_eq!(
+        last(100),
+        " STOPPED: k acknowledges. Up Down Home End other trials, PgUp PgDn scroll, Esc Enter q close."
+    );
 }
 
 /// Regression: whole verdicts were left out of the heading without a sign.

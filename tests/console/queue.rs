@@ -172,7 +172,7 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.send("N");
-    session.wait_for(&["Left earlier"]);
+    session.wait_for(&["Left Right move it"]);
     session.send(" ");
     session.wait_for(&["DAMPED"]);
     session.send("k");

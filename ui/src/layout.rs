@@ -6,6 +6,7 @@ use strum::VariantArray;
 
 use crate::action::Action;
 use crate::keymap::Keymap;
+use crate::model::dialog::MAX_WIDTH;
 use crate::model::{Model, View};
 use crate::wrap::wrap;
 
@@ -92,6 +93,11 @@ pub fn areas(size: Size, model: &Model) -> Option<Areas> {
     ])
     .areas(Rect::from(((0, 0).into(), size)));
     Some(Areas { frame, tabs, body, timeline, message, next_step })
+}
+
+/// The columns within the borders and margins of the widest dialog.
+pub fn dialog_columns(model: &Model) -> usize {
+    usize::from(model.size.0.min(MAX_WIDTH).saturating_sub(4))
 }
 
 /// The rows within the borders of the highest dialog.

@@ -13,12 +13,15 @@
 
 pub mod action;
 pub mod app;
+mod arming;
 pub mod cell_encoder;
 mod column;
 pub mod connection;
+mod draw;
 pub mod export;
 pub mod feed;
 pub mod graphics;
+mod help;
 pub mod input;
 pub mod keymap;
 mod layout;

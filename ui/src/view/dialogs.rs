@@ -21,7 +21,7 @@ use tui_input::Input;
 
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
-use super::{arming, help, log, questions, queue};
+use super::{log, questions, queue};
 use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
 use crate::legal::palette;
@@ -29,6 +29,7 @@ use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose};
 use crate::theme::{Glyphs, Role, Theme};
 use crate::wrap::{wrap, wrap_all};
+use crate::{arming, help};
 
 /// Columns before the text of an action: its key and its name.
 const PALETTE_INDENT: usize = 26;
@@ -68,19 +69,19 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             let (lines, of_selected) = queue::lines(model, *selected, width);
             // The selected point stays in sight.
             let scroll = (of_selected.end + 2).saturating_sub(usize::from(area.height));
-            render_lines(frame, area, model, ("Queue", MAX_WIDTH, "Up Down"), lines, scroll);
+            render_lines(frame, area, model, ("Queue", MAX_WIDTH, "Up Down Home End"), lines, scroll);
         }
         Dialog::Help { scroll } => {
             let width = area.width.min(MAX_WIDTH);
             let lines = wrap_all(&help::lines(model), usize::from(width.saturating_sub(4)), help::INDENT);
-            render_lines(frame, area, model, ("Keys", width, "Up Down"), lines, *scroll)
+            render_lines(frame, area, model, ("Keys", width, "Up Down Home End"), lines, *scroll)
         }
         Dialog::Report { lines, scroll } => {
             let width = area.width.min(MAX_WIDTH);
             // The terminal may have become narrower since.
             let lines: Vec<Line> = lines.iter().cloned().map(Line::from).collect();
             let lines = wrap_all(&lines, usize::from(width.saturating_sub(4)), 0);
-            render_lines(frame, area, model, ("Study", width, "Up Down"), lines, *scroll);
+            render_lines(frame, area, model, ("Study", width, "Up Down Home End"), lines, *scroll);
         }
         Dialog::Details { trial, scroll } => render_details(frame, area, model, *trial, *scroll),
         Dialog::LogLine { scroll } => {
@@ -104,7 +105,7 @@ fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, 
     // Until the list is paged, the chosen item is visible.
     let scroll = scroll.checked_sub(1).unwrap_or(of_chosen.end.saturating_sub(room));
     let title = arming::title(model, area.width < MIN_COLUMNS);
-    render_lines(frame, area, model, (&title, width, "PgUp PgDn"), lines, scroll);
+    render_lines(frame, area, model, (&title, width, "PgUp PgDn Home End"), lines, scroll);
 }
 
 /// The details of a trial; the paging keys scroll.
@@ -122,7 +123,7 @@ fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scro
     }
     let at_playhead = model.session.trials.records.get(&trial);
     let time = if at_playhead == Some(record) { "" } else { ", at the end of the recording" };
-    render_lines(frame, area, model, (&format!("Trial #{trial}{time}"), width, "PgUp PgDn"), lines, scroll);
+    render_lines(frame, area, model, (&format!("Trial #{trial}{time}"), width, "PgUp PgDn Home End"), lines, scroll);
 }
 
 /// Draws an empty bordered box; returns its inside. Where Space types although the robot is energised, the frame has the
@@ -379,7 +380,8 @@ fn by_hand(model: &Model, trial: u32) -> String {
 fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
     let theme = &model.theme;
     let actions = palette(input.value(), model);
-    let title = format!("Actions ({} of {}, Up Down PgUp PgDn)", (selected + 1).min(actions.len()), actions.len());
+    let title =
+        format!("Actions ({} of {}, Up Down PgUp PgDn Home End)", (selected + 1).min(actions.len()), actions.len());
     let inner = open_box(frame, area, model, &title, area.width.min(MAX_WIDTH), area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
@@ -421,7 +423,7 @@ fn render_choice(frame: &mut Frame, area: Rect, model: &Model, subject: Choice, 
     let room = usize::from(area.height.saturating_sub(2)).min(rows.len());
     let first = (selected + 1).saturating_sub(room);
     let title = match rows.len() > room {
-        true => format!("{title} ({}-{} of {}, Up Down)", first + 1, first + room, rows.len()),
+        true => format!("{title} ({}-{} of {}, Up Down Home End)", first + 1, first + room, rows.len()),
         false => title.to_owned(),
     };
     // The symbol, two spaces, the border and its margins.

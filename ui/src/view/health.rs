@@ -12,8 +12,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::draw::{NO_STATE, heading, span, without_sign_of_zero};
-use super::{arming, health_history};
+use super::health_history;
 use crate::action::Action;
+use crate::arming;
 use crate::model::Model;
 use crate::model::history::ChartSample;
 use crate::theme::Role;

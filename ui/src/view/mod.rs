@@ -12,7 +12,6 @@
 //!  Press g twice to jump  ·  o override  ·  n skip  ·  D sit down             <- the next possible step
 //! ```
 
-mod arming;
 mod beside;
 mod chart;
 mod compact;
@@ -21,11 +20,9 @@ mod densities;
 mod details;
 mod dialogs;
 mod dots;
-mod draw;
 mod drawing;
 mod health;
 mod health_history;
-mod help;
 mod last_line;
 mod live;
 mod log;
@@ -50,6 +47,7 @@ mod wireframe;
 use ratatui::Frame;
 use ratatui::layout::{Rect, Size};
 
+use crate::draw;
 use crate::layout::{Areas, areas, compact_areas};
 use crate::model::{Model, View};
 pub(crate) use drawing::Drawing;

@@ -358,8 +358,8 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::ArmingChecks { .. } => {
             let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
             match model.session.info.is_hardware() {
-                true => format!("Up Down choose, x confirms, PgUp PgDn scroll, {close}{arms}"),
-                false => format!("Up Down PgUp PgDn scroll, {close}{arms}"),
+                true => format!("Up Down choose, x confirms, PgUp PgDn Home End scroll, {close}{arms}"),
+                false => format!("Up Down PgUp PgDn Home End scroll, {close}{arms}"),
             }
         }
         Dialog::Override(form) if dialog.has_refused_character() => {
@@ -408,14 +408,14 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
             format!("{enter}, Esc cancels.{space}")
         }
-        Dialog::Palette { .. } => "Type to filter, Up Down choose, Enter does it, Esc closes.".to_owned(),
-        Dialog::Choose { .. } => format!("Up Down choose, x switches it on or off, {close}"),
+        Dialog::Palette { .. } => "Type to filter, Up Down Home End choose, Enter does it, Esc closes.".to_owned(),
+        Dialog::Choose { .. } => format!("Up Down Home End choose, x switches it on or off, {close}"),
         Dialog::Queue { .. } if model.session.queue().is_empty() => close,
-        Dialog::Queue { .. } if may_request(model).is_err() => format!("Up Down choose, {close}"),
-        Dialog::Queue { .. } => format!("Up Down choose, Left earlier, Right later, x removes, {close}"),
-        Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn scroll, {close}"),
-        Dialog::Details { .. } => format!("Up Down other trials, PgUp PgDn scroll, {close}"),
-        Dialog::LogLine { .. } => format!("Up Down other lines, PgUp PgDn scroll, {close}"),
+        Dialog::Queue { .. } if may_request(model).is_err() => format!("Up Down Home End choose, {close}"),
+        Dialog::Queue { .. } => format!("Up Down Home End choose, Left Right move it, x removes, {close}"),
+        Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn Home End scroll, {close}"),
+        Dialog::Details { .. } => format!("Up Down Home End other trials, PgUp PgDn scroll, {close}"),
+        Dialog::LogLine { .. } => format!("Up Down Home End other lines, PgUp PgDn scroll, {close}"),
     };
     NextStep { lead, short: String::new(), others: Vec::new() }
 }

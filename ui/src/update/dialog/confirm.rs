@@ -8,7 +8,9 @@ use quadfrog::session::operator_request::{OperatorCheck, OperatorRequest};
 use quadfrog::trial::Verdict;
 
 use crate::action::Action;
+use crate::arming;
 use crate::keymap::Key;
+use crate::layout::{dialog_columns, dialog_rows};
 use crate::legal::legal;
 use crate::message::{Effect, ExportedRows};
 use crate::model::Model;
@@ -16,9 +18,8 @@ use crate::model::dialog::{APPROVAL_PAUSE, APPROVAL_TIME, ARMING_TIME, Dialog, P
 use crate::update::perform::queued_values;
 use crate::update::request::{cancelled, refused, reply, request, unknown_key};
 
-/// Lines that a page of the arming checks moves by, and the most that they can have.
+/// Lines that a page of the arming checks moves by.
 const CHECKS_PAGE: usize = 8;
-const CHECKS_LINES: usize = 200;
 
 /// The second press of an approval. Only the approving key approves, and only after a pause: a bounced or held key starts
 /// the pause again. On hardware `y` confirms before that the area is clear. Every other key, Enter included, cancels.
@@ -151,7 +152,7 @@ pub(super) fn quit_key(model: &mut Model, key: Key) -> Vec<Effect> {
 
 /// Arming, from the list that shows whether it is possible.
 pub(super) fn action_over_checks(model: &Model, key: Key) -> Option<Action> {
-    let taken = matches!(key.code(), KeyCode::Up | KeyCode::Down | KeyCode::Char('x'));
+    let taken = matches!(key.code(), KeyCode::Up | KeyCode::Down | KeyCode::Home | KeyCode::End | KeyCode::Char('x'));
     let arms = !taken && model.keymap.action(key) == Some(Action::Arm) && legal(Action::Arm, model).is_ok();
     arms.then_some(Action::Arm)
 }
@@ -173,19 +174,22 @@ pub(super) fn arming_checks_key(
     let last = OperatorCheck::ALL.len() - 1;
     let simulated = !model.session.info.is_hardware();
     let mut effects = Vec::new();
+    let end = arming::whole(model, dialog_columns(model), None).0.len().saturating_sub(dialog_rows(model)) + 1;
     match key.code() {
         // In simulation nothing is confirmed, so that nothing is chosen.
         KeyCode::Up if simulated => scroll = scroll.saturating_sub(1).max(1),
-        KeyCode::Down if simulated => scroll = (scroll.max(1) + 1).min(CHECKS_LINES),
+        KeyCode::Down if simulated => scroll = (scroll.max(1) + 1).min(end),
         KeyCode::Char('x') if simulated => {
             reply(model, LogLevel::Info, "the simulator needs no confirmation");
         }
         KeyCode::Up => (selected, scroll) = (selected.saturating_sub(1), 0),
         KeyCode::Down => (selected, scroll) = ((selected + 1).min(last), 0),
         KeyCode::PageUp => scroll = scroll.saturating_sub(CHECKS_PAGE).max(1),
-        // The first page begins at the top. The drawing stops at the last line.
+        KeyCode::Home => scroll = 1,
+        KeyCode::End => scroll = end,
+        // The first page begins at the top.
         KeyCode::PageDown if scroll == 0 => scroll = 1,
-        KeyCode::PageDown => scroll = (scroll + CHECKS_PAGE).min(CHECKS_LINES),
+        KeyCode::PageDown => scroll = (scroll + CHECKS_PAGE).min(end),
         KeyCode::Char('x') => {
             effects = request(model, OperatorRequest::Confirm(OperatorCheck::ALL[selected.min(last)]))
         }
@@ -196,7 +200,7 @@ pub(super) fn arming_checks_key(
             }
         }
         _ => {
-            let keys = if simulated { "Up Down PgUp PgDn" } else { "Up Down x PgUp PgDn" };
+            let keys = if simulated { "Up Down PgUp PgDn Home End" } else { "Up Down x PgUp PgDn Home End" };
             unknown_key(model, key, keys);
         }
     }

@@ -7,8 +7,9 @@ use tui_input::Input;
 
 use super::text_field::edit;
 use crate::action::Action;
+use crate::help;
 use crate::keymap::Key;
-use crate::layout::dialog_rows;
+use crate::layout::{dialog_columns, dialog_rows};
 use crate::legal::{may_request, palette};
 use crate::message::Effect;
 use crate::model::dialog::{Choice, Dialog, Question};
@@ -16,6 +17,7 @@ use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
 use crate::update::request::{cancelled, refused, request, unknown_key};
+use crate::wrap::wrap_all;
 
 /// Lines that a page of a trial's details moves by; there are never more than two pages of them.
 const DETAILS_PAGE: usize = 10;
@@ -42,6 +44,8 @@ pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut sel
         KeyCode::Down => selected = (selected + 1).min(rows.len().saturating_sub(1)),
         KeyCode::PageUp => selected = selected.saturating_sub(PALETTE_PAGE),
         KeyCode::PageDown => selected = (selected + PALETTE_PAGE).min(rows.len().saturating_sub(1)),
+        KeyCode::Home => selected = 0,
+        KeyCode::End => selected = rows.len().saturating_sub(1),
         // Enter never starts motion: `chosen_action` leaves arming, which is confirmed here.
         KeyCode::Enter if rows.get(selected).is_some() => {
             model.dialog = Some(Dialog::Arm { typed: 0, opened_at: model.clock });
@@ -62,35 +66,35 @@ pub(super) fn help_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Effect
     if model.keymap.action(key) == Some(Action::Help) {
         return Vec::new();
     }
-    let scroll = scrolled(model, key, scroll, "Up Down PgUp PgDn Home");
+    let rows = wrap_all(&help::lines(model), dialog_columns(model), help::INDENT).len();
+    let scroll = scrolled(model, key, scroll, rows);
     model.dialog = Some(Dialog::Help { scroll });
     Vec::new()
 }
 
 pub(super) fn report_key(model: &mut Model, key: Key, lines: Vec<String>, scroll: usize) -> Vec<Effect> {
-    let last = lines.len().saturating_sub(dialog_rows(model));
-    let scroll = match key.code() {
-        KeyCode::End => last,
-        _ => scrolled(model, key, scroll, "Up Down PgUp PgDn Home End").min(last),
-    };
+    let scroll = scrolled(model, key, scroll, lines.len());
     model.dialog = Some(Dialog::Report { lines, scroll });
     Vec::new()
 }
 
-/// Returns the lines above the shown ones after a key; one that does not scroll is answered with those that do.
-fn scrolled(model: &mut Model, key: Key, scroll: usize, keys: &str) -> usize {
+/// Returns the number of the `rows` above the shown ones after a key; one that does not scroll is answered with those that do.
+fn scrolled(model: &mut Model, key: Key, scroll: usize, rows: usize) -> usize {
     let page = model.page.max(2) - 1;
-    match key.code() {
+    let last = rows.saturating_sub(dialog_rows(model));
+    let scroll = match key.code() {
         KeyCode::Up => scroll.saturating_sub(1),
         KeyCode::Down => scroll + 1,
         KeyCode::PageUp => scroll.saturating_sub(page),
         KeyCode::PageDown => scroll + page,
         KeyCode::Home => 0,
+        KeyCode::End => last,
         _ => {
-            unknown_key(model, key, keys);
+            unknown_key(model, key, "Up Down PgUp PgDn Home End");
             scroll
         }
-    }
+    };
+    scroll.min(last)
 }
 
 /// Switches in a list, which stays open; the change shows at once.
@@ -135,6 +139,8 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
     let (selected, change) = match (key.code(), trial) {
         (KeyCode::Up, Some(_)) => (selected.saturating_sub(1), None),
         (KeyCode::Down, Some(_)) => ((selected + 1).min(last), None),
+        (KeyCode::Home, Some(_)) => (0, None),
+        (KeyCode::End, Some(_)) => (last, None),
         (KeyCode::Left, Some(trial)) => {
             (selected.saturating_sub(1), Some(OperatorRequest::MoveQueued { trial, earlier: true }))
         }
@@ -152,8 +158,8 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
         _ => {
             let keys = match may_request(model) {
                 _ if trial.is_none() => "",
-                Ok(()) => "Up Down Left Right x",
-                Err(_) => "Up Down",
+                Ok(()) => "Up Down Left Right Home End x",
+                Err(_) => "Up Down Home End",
             };
             unknown_key(model, key, keys);
             (selected, None)
@@ -174,11 +180,19 @@ pub(super) fn log_line_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Ef
             move_by(model, 1);
             0
         }
+        KeyCode::Home => {
+            move_by(model, isize::MIN);
+            0
+        }
+        KeyCode::End => {
+            move_by(model, isize::MAX);
+            0
+        }
         KeyCode::PageUp => scroll.saturating_sub(LOG_PAGE),
         // The longest text of a line fills fewer pages.
         KeyCode::PageDown => (scroll + LOG_PAGE).min(20 * LOG_PAGE),
         _ => {
-            unknown_key(model, key, "Up Down PgUp PgDn");
+            unknown_key(model, key, "Up Down PgUp PgDn Home End");
             scroll
         }
     };
@@ -189,7 +203,7 @@ pub(super) fn log_line_key(model: &mut Model, key: Key, scroll: usize) -> Vec<Ef
 /// The action of a key over the details: verdicts and others work while the details are read.
 pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
     match key.code() {
-        KeyCode::PageUp | KeyCode::PageDown | KeyCode::Up | KeyCode::Down => None,
+        KeyCode::PageUp | KeyCode::PageDown | KeyCode::Up | KeyCode::Down | KeyCode::Home | KeyCode::End => None,
         _ => model.keymap.action(key),
     }
 }
@@ -202,14 +216,16 @@ pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize
         KeyCode::PageDown => (None, (scroll + DETAILS_PAGE).min(DETAILS_PAGE * 2)),
         KeyCode::Up => (numbers().filter(|number| *number < trial).max(), 0),
         KeyCode::Down => (numbers().filter(|number| *number > trial).min(), 0),
+        KeyCode::Home => (numbers().min(), 0),
+        KeyCode::End => (numbers().max(), 0),
         _ => {
-            unknown_key(model, key, "Up Down PgUp PgDn");
+            unknown_key(model, key, "Up Down PgUp PgDn Home End");
             model.dialog = Some(Dialog::Details { trial, scroll });
             return Vec::new();
         }
     };
     let trial = neighbour.unwrap_or(trial);
-    if matches!(key.code(), KeyCode::Up | KeyCode::Down) {
+    if !matches!(key.code(), KeyCode::PageUp | KeyCode::PageDown) {
         // Keys act on the shown trial: as on a row of Trials.
         model.trial_table.selected = Some(trial);
         model.view = View::Trials;

@@ -3,8 +3,8 @@
 use ratatui::text::Line;
 use strum::VariantArray;
 
-use super::draw::span;
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
+use crate::draw::span;
 use crate::legal::{has_meaning, legal};
 use crate::model::Model;
 use crate::theme::Role;

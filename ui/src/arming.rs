@@ -7,8 +7,8 @@ use quadfrog::session::operator_request::OperatorCheck;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState};
 use ratatui::text::{Line, Span};
 
-use super::draw::{span, truncate, wall_clock};
 use crate::action::Action;
+use crate::draw::{span, truncate, wall_clock};
 use crate::model::Model;
 use crate::theme::Role;
 use crate::wrap::wrap;
