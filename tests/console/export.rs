@@ -161,7 +161,8 @@ fn strings(value: &Value) -> Vec<&str> {
 #[test]
 fn the_layout_of_foxglove_names_topics_and_fields_of_a_recording() {
     let program = Program::new();
-    program.text(&["export", "--layout", "foxglove", "-o", "layout.json"]);
+    let reported = program.run(&["export", "--layout", "foxglove", "-o", "layout.json"]).stderr;
+    assert!(String::from_utf8(reported).unwrap().contains("layout: layout.json"));
     let text = fs::read_to_string(program.path("layout.json")).unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     assert_eq!(text, fs::read_to_string(root.join("docs/foxglove-layout.json")).unwrap());

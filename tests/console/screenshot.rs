@@ -73,7 +73,10 @@ fn a_picture_for_paper_has_a_light_background_and_the_end_of_a_trial() {
     let program = Program::new();
     let sample = sample();
     let best = ["screenshot", sample.to_str().unwrap(), "--trial", "12", "--theme", "light", "--output", "a.svg"];
-    program.text(&best);
+    let output = program.run(&best);
+    // Regression: a picture that was written was not reported.
+    assert_shows(&String::from_utf8(output.stderr).unwrap(), &["screenshot: a.svg"]);
+    assert!(output.status.success() && output.stdout.is_empty());
     let (drawn, background) = cells(&std::fs::read_to_string(program.path("a.svg")).unwrap(), 40);
     assert_eq!(background, "#ffffff");
     assert!(drawn[38].contains("trial #12, verdict by --approve auto: accept"), "{drawn:?}");

@@ -60,7 +60,10 @@ fn an_exported_study_is_imported_unchanged_in_both_formats() {
     let (program, first) = study("forward");
     for form in ["csv", "json"] {
         let file = format!("table.{form}");
-        program.text(&["study", "export", &first, "--output", &file]);
+        let output = program.run(&["study", "export", &first, "--output", &file]);
+        // Regression: a table that was written was not reported.
+        let reported = String::from_utf8(output.stderr).unwrap();
+        assert!(output.stdout.is_empty() && reported.contains(&format!(" trials: {file}")), "{reported}");
         let printed = program.text(&["study", "export", &first, "--format", form]);
         assert_eq!(printed, fs::read_to_string(program.path(&file)).unwrap());
         // Into a study of one trial.

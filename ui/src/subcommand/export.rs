@@ -94,7 +94,9 @@ fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure>
         output::data(layout.contents());
         return Ok(());
     };
-    write_file(path, |file| file.write_all(layout.contents().as_bytes()))
+    write_file(path, |file| file.write_all(layout.contents().as_bytes()))?;
+    notice!("layout: {}", path.display());
+    Ok(())
 }
 
 fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failure> {

@@ -7,11 +7,11 @@ use crate::feed::Feed;
 use crate::keymap::Key;
 use crate::message::{Effect, Msg, ReplayCommand};
 use crate::model::Model;
-use crate::output;
 use crate::screenshot::Film;
 use crate::settings::ConsoleSettings;
 use crate::theme::{Colours, Glyphs, Theme, ThemeChoice};
 use crate::update::update;
+use crate::{notice, output};
 use clap::Args;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
@@ -124,7 +124,11 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     }
     let picture = film.svg(rate);
     match &arguments.output {
-        Some(path) => write_file(path, |file| file.write_all(picture.as_bytes())),
+        Some(path) => {
+            write_file(path, |file| file.write_all(picture.as_bytes()))?;
+            notice!("screenshot: {}", path.display());
+            Ok(())
+        }
         None => {
             output::data(&picture);
             Ok(())

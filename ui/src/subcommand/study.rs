@@ -298,11 +298,13 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
     let study = &opened.study;
     let columns = trial_columns::of(study.trials(), study.metric_name(), |number| study.note_of(number));
     if let Some(path) = output {
-        return write_file(path, |file| {
+        write_file(path, |file| {
             let mut table = TableWriter::new(format, file, &columns)?;
             table.write(&columns)?;
             table.finish()
-        });
+        })?;
+        notice!("{}: {}", counted(study.trials().len(), "trial"), path.display());
+        return Ok(());
     }
     let mut bytes = Vec::new();
     let mut table = TableWriter::new(format, &mut bytes, &columns).context("the table")?;
