@@ -116,6 +116,19 @@ fn an_empty_log_says_that_it_is_empty() {
     assert_eq!(console.said(), "the log has no line");
 }
 
+/// Regression: in a resumed session a search without a result left the page empty, although earlier sessions had such lines.
+#[test]
+fn a_search_without_a_result_says_where_the_lines_of_earlier_sessions_are() {
+    let mut console = logged(&["a line"]);
+    console.press(&["/"]);
+    console.enter("fell");
+    console.press(&["Enter"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["0 lines", "No line of this session passes.", "quadfrog replay"]);
+    console.update(Msg::Replay(ReplayStatus::default()));
+    assert_shows(&console.screen(80, 24), &["No line up to this time passes."]);
+}
+
 #[test]
 fn the_log_of_the_program_has_the_time_of_day() {
     let seconds = |time: &str| {

@@ -4,13 +4,14 @@ use quadfrog::recording::record::LogLevel;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
 
 use super::draw::{heading, heading_width, span, truncate, wall_clock};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::log::LogLine;
 use crate::theme::Role;
-use crate::wrap::wrap_all;
+use crate::wrap::{wrap, wrap_all};
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let lines: Vec<&LogLine> = model.log_view.lines(&model.session.log).collect();
@@ -19,13 +20,29 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let aside = if heading_width("Log", &explained) <= usize::from(area.width) { explained } else { summary };
     let body = heading(frame, area, &model.theme, "Log", &aside);
     let space = usize::from(body.height);
-    let Some(newest) = lines.len().checked_sub(1) else { return };
+    let Some(newest) = lines.len().checked_sub(1) else {
+        let text = Line::from(span(&model.theme, Role::Quiet, nothing_shown(model)));
+        frame.render_widget(Paragraph::new(wrap(&text, usize::from(body.width), 1)), body);
+        return;
+    };
     let selected = newest.saturating_sub(model.log_view.back);
     let last = (selected + 1).max(space.min(lines.len()));
     let first = last.saturating_sub(space);
     for (row, line) in lines[first..last].iter().enumerate() {
         let area = Rect { y: body.y + row as u16, height: 1, ..body };
         frame.render_widget(line_of(model, line, first + row == selected, usize::from(body.width)), area);
+    }
+}
+
+/// The reason why no line is shown, and where the lines of earlier sessions are.
+fn nothing_shown(model: &Model) -> &'static str {
+    let filtered = !model.log_view.search.is_empty() || model.log_view.level.is_some();
+    match (model.replay.is_some(), filtered) {
+        (true, true) => " No line up to this time passes.",
+        (false, true) => {
+            " No line of this session passes. Those of earlier sessions of the study are shown by quadfrog replay with its folder."
+        }
+        (_, false) => " No line yet.",
     }
 }
 
