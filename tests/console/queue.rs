@@ -5,7 +5,9 @@ use std::process::{Command, Output};
 
 use crate::pty::Session;
 use crate::skip::skip;
-use crate::support::line_with;
+use crate::support::{Console, assert_shows, line_with, session as session_info};
+use quadfrog::recording::record::{Record, SessionInfo};
+use quadfrog::trial::{ParameterInfo, ProposalSource, QueuedPoint, SearchStatus};
 
 fn quadfrog(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_quadfrog")).args(arguments).current_dir(folder).output().expect("it runs")
@@ -273,4 +275,27 @@ fn a_change_of_the_search_says_that_the_proposal_is_drawn_again() {
     session.send("3\r");
     session.wait_for(&["proposal 0 is drawn again"]);
     assert!(session.quit().success());
+}
+
+/// Regression: a number and its unit stood on two lines of the list.
+#[test]
+fn a_number_of_the_queue_stays_on_the_line_of_its_unit() {
+    let mut console = Console::ready();
+    let gains = [("kp", 450.0), ("kd", 12.0), ("kp_joint", 60.0), ("kd_joint", 0.8)];
+    let info = |(name, _): &(&str, f64)| ParameterInfo {
+        name: (*name).into(),
+        unit: "N m / s/rad".into(),
+        ..ParameterInfo::default()
+    };
+    let known = gains.iter().map(info).collect();
+    console.record(Record::Session(SessionInfo { gains: known, ..session_info() }));
+    let gains: Vec<(String, f64)> = gains.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+    let point =
+        QueuedPoint { trial: 3, source: ProposalSource::Operator, gains: gains.into(), ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: vec![point], ..SearchStatus::default() }));
+    console.press(&["N"]);
+    for columns in 80..=160 {
+        let screen = console.screen(columns, 24);
+        assert_shows(&screen, &["kp 450.0 N m / s/rad", "kp_joint 60.00 N m / s/rad", "kd_joint 0.800 N m / s/rad"]);
+    }
 }

@@ -3,6 +3,11 @@
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
+/// The text with spaces at which [`wrap`] does not break it; they are drawn as other spaces.
+pub fn unbroken(text: &str) -> String {
+    text.replace(' ', "\u{a0}")
+}
+
 /// The line in pieces of at most `width` characters, broken at spaces. A word that is longer than a line is broken behind a `/`, and
 /// inside a part of a path only if that is longer than a line, too. Further
 /// pieces begin with `indent` spaces. Styles stay with their characters.
@@ -78,7 +83,8 @@ pub fn wrap_all(lines: &[Line], width: usize, indent: usize) -> Vec<Line<'static
 fn restyled(cells: &[(char, Style)], indent: usize) -> Line<'static> {
     let mut spans = if indent > 0 { vec![Span::raw(" ".repeat(indent))] } else { Vec::new() };
     for run in cells.chunk_by(|a, b| a.1 == b.1) {
-        spans.push(Span::styled(run.iter().map(|(c, _)| *c).collect::<String>(), run[0].1));
+        let text = run.iter().map(|(c, _)| if *c == '\u{a0}' { ' ' } else { *c });
+        spans.push(Span::styled(text.collect::<String>(), run[0].1));
     }
     Line::from(spans)
 }

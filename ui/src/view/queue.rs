@@ -9,7 +9,7 @@ use super::draw::span;
 use crate::action::Action;
 use crate::model::Model;
 use crate::theme::Role;
-use crate::wrap::{wrap, wrap_all};
+use crate::wrap::{unbroken, wrap, wrap_all};
 
 /// Columns before the words of a point.
 const INDENT: usize = 7;
@@ -49,5 +49,8 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
 fn described(model: &Model, point: &QueuedPoint) -> String {
     let info = &model.session.info;
     let source = point.source.with_parent(point.parent);
-    format!("#{:<4} {source:<15} {}", point.trial, point.in_words(info.parameters.iter().chain(&info.gains)))
+    let words = point.in_words(info.parameters.iter().chain(&info.gains));
+    // A number stays on the line of its unit.
+    let words: Vec<String> = words.split(", ").map(unbroken).collect();
+    format!("#{:<4} {source:<15} {}", point.trial, words.join(", "))
 }
