@@ -391,7 +391,7 @@ impl Supervisor {
                 self.ended = Some(Ended { trial, end, ticks, time_ns });
             }
             Event::SetUpright => {
-                let message = "the simulated robot was laid upright and folded; a person does this with a real one";
+                let message = "the simulated robot was laid upright and folded; a real one needs a person";
                 let level = if self.unattended.approval == Approval::Auto { LogLevel::Info } else { LogLevel::Warning };
                 self.log(level, message.to_owned(), time_ns);
             }
