@@ -2,6 +2,7 @@
 
 use crate::support;
 use crate::support::{Console, assert_shows, session, trial};
+use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
@@ -175,6 +176,16 @@ fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
     assert_shows(&console.screen(80, 24), &["a time, #7 for a trial, best or fall is typed; Esc"]);
     assert_eq!(console.press(&["Enter"]), []);
     assert_shows(&console.screen(80, 24), &["nothing was typed: a time, #7 for a trial, best or fall is needed"]);
+}
+
+#[test]
+fn a_space_in_a_place_of_a_recording_stops_the_robot_of_an_observed_session() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus { observer: Some(ObserverStatus::default()), ..ReplayStatus::default() }));
+    console.press(&["G"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["12:34, 1:02:03.5, 75.5, #7, best of the recording, fall", "Space is STOP."]);
+    assert_eq!(console.press(&["Space"]), [Effect::Stop]);
 }
 
 /// Regression: of a word the field took the letters of `best` alone and then said that nothing was typed; `fall` was refused.
