@@ -359,6 +359,8 @@ fn a_finished_study_says_so_and_what_comes_next() {
     assert!(screen.matches("450.0").count() == 1 && !screen.contains("was 400.0"), "{screen}");
     console = finished();
     console.press(&["C"]);
+    // Regression: the field did not say what it takes and to what the trials are added.
+    assert_shows(&console.screen(80, 24), &["1 to 1000, added to the budget of 4; 4 of them count so far"]);
     assert_eq!(console.requests(&["Enter"]), [OperatorRequest::Continue(20)]);
     console.press(&["K"]);
     assert!(console.screen(80, 24).contains("How many repeats at most"));

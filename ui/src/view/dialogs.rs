@@ -354,7 +354,11 @@ fn field(
             };
             format!("the sampler proposes again from the changed trials; the journal keeps the old verdict{room}")
         }
-        Purpose::Note(_) | Purpose::Continue | Purpose::TrialNumber => String::new(),
+        Purpose::Continue => {
+            let (counted, budget) = (model.session.counted(), model.session.budget());
+            format!("1 to 1000, added to the budget of {budget}; {counted} of them count so far")
+        }
+        Purpose::Note(_) | Purpose::TrialNumber => String::new(),
     };
     let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
     vec![Line::from(spans), Line::default(), Line::from(below)]
