@@ -141,6 +141,18 @@ fn the_dialog_of_a_confirmation_says_how_many_repeats_it_takes() {
         &joined(&console.screen(80, 24)),
         &["to compare them takes 5 repeats", "does not count for the budget"],
     );
+    // Regression: a number that allows no comparison was accepted, and the answer said so only afterwards.
+    console.enter("4");
+    assert_eq!(console.requests(&["Enter"]), []);
+    let few = ["To compare the best points takes 5 repeats: 4 repeats cannot confirm", "Back to the field"];
+    assert_shows(&joined(&console.screen(80, 24)), &few);
+    assert_shows(&console.next_step(), &["Press y to repeat all the same."]);
+    console.press(&["Enter"]);
+    assert_eq!(console.requests(&["Enter", "y"]), [OperatorRequest::ConfirmBest { repeats: 4 }]);
+    console.press(&["K"]);
+    console.enter("5");
+    assert_eq!(console.requests(&["Enter"]), [OperatorRequest::ConfirmBest { repeats: 5 }]);
+    console.press(&["K"]);
     // Regression: the repeats make the last verdict final, and the screen had promised `u` until the next approval.
     assert!(!joined(&console.screen(80, 24)).contains("then stays"));
     console.press(&["Esc"]);

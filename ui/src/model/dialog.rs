@@ -109,6 +109,8 @@ pub enum Question {
     RemoveQueued { trial: u32 },
     /// Take a verdict back while another row is selected.
     Undo { trial: u32 },
+    /// Confirm the best with fewer repeats than a comparison takes.
+    FewRepeats { repeats: u32 },
     /// End the repeats that confirm the best.
     EndRepeats,
     /// Queue the parameters of a judged trial again.

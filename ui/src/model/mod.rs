@@ -336,6 +336,11 @@ impl Model {
         self.dialog.as_ref().is_some_and(|dialog| dialog.takes_spaces(self.can_stop())) && !self.space_bar_must_stop()
     }
 
+    /// Repeats that a confirmation of the best needs at least; 0 if that is not known.
+    pub fn least_repeats(&self) -> usize {
+        self.contenders.map_or(0, |contenders| self.session.trials.least_repeats(contenders))
+    }
+
     /// Whether Space is STOP in a text field, too.
     pub fn space_bar_must_stop(&self) -> bool {
         self.space_always_stops && self.robot_is_energised()

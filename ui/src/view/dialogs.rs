@@ -317,8 +317,8 @@ fn field(
             format!("the others are still proposed; a trial that is void or has another {name} uses up none")
         }
         Purpose::ConfirmBest => {
-            let needed = match model.contenders.map(|contenders| model.session.trials.least_repeats(contenders)) {
-                Some(least) if least > 0 => format!("; to compare them takes {}", counted(least, "repeat")),
+            let needed = match model.least_repeats() {
+                least if least > 0 => format!("; to compare them takes {}", counted(least, "repeat")),
                 _ => String::new(),
             };
             let last = match model.session.undoable() {

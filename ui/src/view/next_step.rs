@@ -391,6 +391,9 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Confirm(Question::RemoveQueued { trial }) => {
             format!("Press y to remove trial #{trial} from the queue. Any other key cancels.")
         }
+        Dialog::Confirm(Question::FewRepeats { .. }) => {
+            "Press y to repeat all the same. Any other key goes back to the field.".to_owned()
+        }
         Dialog::Confirm(Question::EndRepeats) => "Press y to end the repeats. Any other key cancels.".to_owned(),
         Dialog::Confirm(Question::Undo { trial }) => {
             format!("Press y to take the verdict of trial #{trial} back. Any other key cancels.")

@@ -207,6 +207,16 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             );
             ("Take the last verdict back?", vec![Line::from(text), Line::default(), answers(&model.theme, "y", "undo")])
         }
+        Question::FewRepeats { repeats } => {
+            let least = counted(model.least_repeats(), "repeat");
+            let few = counted(*repeats as usize, "repeat");
+            let lines = vec![
+                Line::from(format!("To compare the best points takes {least}: {few} cannot confirm any of them.")),
+                Line::default(),
+                answers_or("Back to the field", &model.theme, "y", "repeat all the same"),
+            ];
+            ("So few repeats?", lines)
+        }
         Question::EndRepeats => {
             let left = counted(model.session.confirming().unwrap_or(0) as usize, "repeat");
             let mut lines = vec![Line::from(format!("{left} will not be run: the best is not confirmed."))];

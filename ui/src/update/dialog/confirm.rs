@@ -123,6 +123,15 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
                 false => cancelled(model, "not removed"),
             }
         }
+        Question::FewRepeats { repeats } if yes => {
+            let confirm = OperatorRequest::ConfirmBest { repeats: *repeats };
+            request_if_legal(model, Action::ConfirmBest, confirm, "not repeated")
+        }
+        Question::FewRepeats { repeats } => {
+            // Back to the field, where typing replaces the number.
+            model.dialog = Some(Dialog::field(Purpose::ConfirmBest, &repeats.to_string()));
+            Vec::new()
+        }
         Question::EndRepeats if yes => {
             let end = OperatorRequest::ConfirmBest { repeats: 0 };
             request_if_legal(model, Action::ConfirmBest, end, "the repeats go on")

@@ -106,7 +106,14 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             OperatorRequest::Fix { parameter: info.name.clone(), value, trials }
         }
         Purpose::Bounds { parameter } => bounds(model, parameter, text)?,
-        Purpose::ConfirmBest => OperatorRequest::ConfirmBest { repeats: count(text, "repeats")? },
+        Purpose::ConfirmBest => {
+            let repeats = count(text, "repeats")?;
+            if (repeats as usize) < model.least_repeats() {
+                model.dialog = Some(Dialog::Confirm(Question::FewRepeats { repeats }));
+                return Ok(Vec::new());
+            }
+            OperatorRequest::ConfirmBest { repeats }
+        }
         Purpose::VoidReason { .. } if text.is_empty() => {
             return Err("give the reason why the parameters did not cause it".to_owned());
         }
