@@ -467,6 +467,8 @@ fn the_line_of_a_fall_names_value_by_hand_and_note_where_it_has_room() {
     let last = |columns: u16| console.screen(columns, 40).lines().last().unwrap().to_owned();
     assert_shows(&last(200), &["FELL", "f fall (suggested)", "q quit", "= value by hand", "m note"]);
     assert_shows(&last(80), &["FELL", "k acknowledges", "f fall (suggested)"]);
+    // Regression: at 120 columns the key that quits stood in the place of the note, and 16 columns were empty.
+    assert_shows(&last(120), &["r re-run", "m note", "? more"]);
 }
 
 /// Regression: letters of a reason whose field had not opened were commands; the r among them queued a jump.

@@ -148,9 +148,10 @@ fn live(model: &Model) -> NextStep {
                 |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
             let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
             let rerun = if review { &[(Action::Rerun, "re-run")][..] } else { &[] };
-            let more = [(Action::HandValue, "value by hand"), (Action::Note, "note")];
-            let more = if review { &more[..] } else { &[] };
-            step(lead, model, &[&verdicts[..], rerun, &[undo, quit], more].concat())
+            // Of a fall a value by hand is not reported: the note comes first.
+            let about = [(Action::Note, "note"), (Action::HandValue, "value by hand")];
+            let about = if review { &about[..] } else { &[] };
+            step(lead, model, &[&verdicts[..], rerun, about, &[undo, quit]].concat())
         }
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
