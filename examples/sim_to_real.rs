@@ -84,7 +84,6 @@ impl Proposer {
 struct KnownTask {
     name: String,
     plan: PriorPlan,
-    sampler: SamplerConfig,
     space: Space,
     prior: Arc<PriorModel>,
     mirrored: Arc<PriorModel>,
@@ -141,7 +140,7 @@ impl<'a> Jumper<'a> {
 }
 
 fn new_study(task: &KnownTask, proposer: Proposer, seed: u32) -> Study {
-    let sampler = SamplerConfig { kind: proposer.kind(), seed, ..task.sampler.clone() };
+    let sampler = SamplerConfig { kind: proposer.kind(), seed, ..SamplerConfig::default() };
     let options = StudyOptions {
         name: proposer.name().to_owned(),
         direction: Direction::Maximize,
@@ -260,7 +259,6 @@ fn known(name: &str, jobs: usize) -> KnownTask {
         Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)))).expect("a space");
     let mut task = KnownTask {
         name: name.to_owned(),
-        sampler: config.sampler(task),
         space,
         prior: Arc::new(PriorModel::new(prior)),
         mirrored: Arc::new(PriorModel::new(mirrored)),

@@ -99,23 +99,15 @@ fn a_file_replaces_key_by_key() {
 #[test]
 fn a_key_that_the_defaults_leave_out_may_be_given() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("optimize.toml"), "[sampler]\nkind = \"gp\"\nstartup_trials = 5\n").unwrap();
+    fs::write(
+        folder.path().join("optimize.toml"),
+        "[sampler]\nkind = \"gp\"\nstartup_trials = 5\nleast_p_stand = 0.9\n",
+    )
+    .unwrap();
     let config = Config::load(Some(folder.path())).unwrap();
-    assert_eq!(config.optimize.sampler.startup_trials, Some(5));
-    refuses("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n", &["sampler.startup_trials", "whole number"]);
-}
-
-#[test]
-fn several_jumps_in_a_row_are_to_stand_more_surely_unless_the_key_is_given() {
-    let folder = tempfile::tempdir().unwrap();
-    let least = |config: &Config, task| config.sampler(task).least_p_stand;
-    fs::write(folder.path().join("control.toml"), "[tasks.forward]\njumps = 3\nf1_hz = 1.0\n").unwrap();
-    let config = Config::load(Some(folder.path())).unwrap();
-    assert_eq!((least(&config, Task::Forward), least(&config, Task::TwistCcw)), (Some(0.85), None));
-    fs::write(folder.path().join("optimize.toml"), "[sampler]\nleast_p_stand = 0.9\n").unwrap();
-    let config = Config::load(Some(folder.path())).unwrap();
-    assert_eq!((least(&config, Task::Forward), least(&config, Task::TwistCcw)), (Some(0.9), Some(0.9)));
+    assert_eq!((config.optimize.sampler.startup_trials, config.optimize.sampler.least_p_stand), (Some(5), Some(0.9)));
     refuses("optimize.toml", "[sampler]\nleast_p_stand = 1.0\n", &["sampler.least_p_stand", "0.99"]);
+    refuses("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n", &["sampler.startup_trials", "whole number"]);
 }
 
 #[test]

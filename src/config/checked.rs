@@ -13,7 +13,7 @@ use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
 use crate::control::force_profile::second_direction;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
-use crate::optimize::ask::{SamplerConfig, SamplerKind};
+use crate::optimize::ask::SamplerKind;
 use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
@@ -22,10 +22,6 @@ use crate::robot::description::{RobotDescription, RobotFiles, read_text};
 use crate::sim::SimConfig;
 use crate::sim::ensemble::EnsembleSettings;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
-
-/// `sampler.least_p_stand` of a task of several jumps in a row where it is left out. In the measured range surer jumps are the longer
-/// ones there: the value of a trial is that of all its jumps (`src/optimize/README.md`, "Ask").
-const LEAST_P_STAND_IN_A_ROW: f64 = 0.85;
 
 /// A text laid over the file of a name.
 #[derive(Debug, Clone, Copy)]
@@ -175,14 +171,6 @@ impl Config {
     /// Whether `task` optimizes the parameter or gain `name`.
     pub fn optimizes(&self, task: Task, name: &str) -> bool {
         self.optimize.parameters[task.name()].iter().any(|parameter| parameter == name)
-    }
-
-    /// Returns the settings of the sampler for `task`, with the default of several jumps in a row.
-    pub fn sampler(&self, task: Task) -> SamplerConfig {
-        let control = self.task(task);
-        let in_a_row = control.jumps > 1 || control.duration_s.is_some();
-        let least_p_stand = self.optimize.sampler.least_p_stand.or(in_a_row.then_some(LEAST_P_STAND_IN_A_ROW));
-        SamplerConfig { least_p_stand, ..self.optimize.sampler.clone() }
     }
 
     /// Returns the first point of a new study of `task`; empty if none is given.

@@ -19,7 +19,8 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     let modelled = insight.is_some_and(|insight| !insight.predicted.is_empty());
     let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
     let importance = parameter.and_then(|parameter| parameter.importance);
-    let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
+    let of_best = if area.width >= 58 && !modelled { " for the best tenth" } else { "" };
+    let aside = importance.map_or(String::new(), |share| format!("importance{of_best} {:.0} %", share * 100.0));
     let body = heading(frame, area, theme, &title(insight, modelled, &info.name, area.width), &aside);
     let drawn = match insight {
         Some(insight) if modelled => render_prediction(frame, body, session, insight, info, theme),
