@@ -110,7 +110,7 @@ fn what_we_write_into_a_journal_of_optuna_4_does_not_break_optuna_4() {
         "params_x,params_y,value,datetime_start,datetime_complete,state\n\
         1.5,0.5,3.25,2026-07-01T10:00:00Z,2026-07-01T10:00:03.5Z,COMPLETE\n",
     );
-    assert_shows(&text(&program, &["study", "import", "four.log", "points.csv"]), &["1 trials"]);
+    assert_shows(&text(&program, &["study", "import", "four.log", "points.csv"]), &["1 trial"]);
     text(&program, &["study", "enqueue", "four.log", "x=2", "y=0.25"]);
     for optuna in [Optuna::Four, Optuna::Five] {
         let theirs = optuna.run(&program, &["times", "four.log"]);
