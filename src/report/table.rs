@@ -6,8 +6,8 @@ use std::fmt::Write;
 use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
 use crate::trial::{
-    JudgedBy, JumpRow, Overrides, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord,
-    Verdict, counted, four_digits, parameter_unit,
+    JudgedBy, JumpRow, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord, Verdict,
+    counted, four_digits, parameter_unit,
 };
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
@@ -93,7 +93,7 @@ pub fn overrides(rows: &[TrialRecord]) -> String {
             let unit = parameter_unit(&p.name);
             format!("{} {} {unit}, proposed {} {unit}", p.name, four_digits(p.value), four_digits(p.proposed))
         };
-        let values: Vec<String> = Overrides::default().of(row).iter().map(value).collect();
+        let values: Vec<String> = row.overrides().iter().map(value).collect();
         if !values.is_empty() {
             let ran = if row.was_not_run() { "was set to" } else { "ran with" };
             let _ = writeln!(text, "Trial {} {ran} {}", row.trial, values.join("; "));

@@ -225,12 +225,7 @@ pub fn suggest(end: &TrialEnd) -> (Verdict, String) {
         TrialEnd::Fell(cause) => (Verdict::Fall, cause.to_string()),
         TrialEnd::Stopped => (Verdict::Void, "STOP was pressed".into()),
         TrialEnd::Cancelled => (Verdict::Void, "countdown cancelled, the robot did not jump".into()),
-        TrialEnd::Refused(because) => {
-            let text = because.to_string();
-            // The rest is the remedy at that moment.
-            let (reason, _) = text.split_once("; ").unwrap_or((&text, ""));
-            (Verdict::Void, format!("not begun: {reason}"))
-        }
+        TrialEnd::Refused(because) => (Verdict::Void, format!("not begun: {}", because.without_remedy())),
         TrialEnd::NotReady(inhibit) => (Verdict::Void, format!("not begun: {inhibit}")),
         TrialEnd::Held(inhibit) => (Verdict::Void, format!("no further jump: {inhibit}")),
         TrialEnd::SatDown => (Verdict::Void, "no further jump: sat down by the operator".into()),

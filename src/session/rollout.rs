@@ -7,7 +7,7 @@ use crate::realtime::clock::SimulatedClock;
 use crate::recording::record::Transition;
 use crate::robot::ticks_in;
 use crate::robot::{CONTROL_PERIOD_S, Placement, Robot};
-use crate::telemetry::{Command, CommandRefusal, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
+use crate::telemetry::{Command, Event, Fault, Permit, Tick, TrialEnd, TrialSpec};
 
 /// A robot in simulated time.
 pub struct Rollout<R: Robot> {
@@ -64,8 +64,7 @@ impl<R: Robot> Rollout<R> {
             }));
             let ended = cycle.events().iter().find_map(|event| match event {
                 Event::TrialEnded { end, .. } => Some(end),
-                Event::Refused { because: CommandRefusal::Inhibited(inhibit), .. } => Some(TrialEnd::NotReady(inhibit)),
-                Event::Refused { because, .. } => Some(TrialEnd::Refused(because)),
+                Event::Refused { because, .. } => Some(because.into()),
                 Event::Mode { .. } | Event::SetUpright => None,
             });
             if let Some(end) = ended {

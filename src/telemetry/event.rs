@@ -29,6 +29,16 @@ pub enum TrialEnd {
     SatDown,
 }
 
+impl From<CommandRefusal> for TrialEnd {
+    /// The end of a trial that the control thread refused.
+    fn from(because: CommandRefusal) -> TrialEnd {
+        match because {
+            CommandRefusal::Inhibited(inhibit) => TrialEnd::NotReady(inhibit),
+            refusal => TrialEnd::Refused(refusal),
+        }
+    }
+}
+
 /// An event of the control thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the fields are named for their types; `time_ns` counts from the start of the engine")]
@@ -43,7 +53,7 @@ pub enum Event {
     Refused { command: Command, mode: Mode, because: CommandRefusal },
 }
 
-/// Reason to refuse a command.
+/// Reason to refuse a command. After a semicolon its message has the remedy of that moment.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the message describes a variant, the name of a field holds its unit")]
 pub enum CommandRefusal {
@@ -70,6 +80,14 @@ pub enum CommandRefusal {
     Lowered,
     #[error("this key press was answered before; check the robot and press again")]
     Answered,
+}
+
+impl CommandRefusal {
+    /// Returns its message without the remedy.
+    pub fn without_remedy(&self) -> String {
+        let message = self.to_string();
+        message.split_once("; ").map_or(message.clone(), |(reason, _)| reason.to_owned())
+    }
 }
 
 /// Conditions of the next arming and the next trial.

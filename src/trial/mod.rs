@@ -220,10 +220,14 @@ pub struct Proposal {
 }
 
 impl Proposal {
+    /// Returns the parameters, and after them the gains, that have another value than the proposed one.
+    pub fn changed(&self) -> impl Iterator<Item = &ProposedParameter> {
+        self.parameters.iter().chain(&self.gains).filter(|p| p.value != p.proposed)
+    }
+
     /// Returns the proposed values of the parameters and gains that have another one.
     pub fn replaced(&self) -> ParameterValues {
-        let changed = self.parameters.iter().chain(&self.gains).filter(|p| p.value != p.proposed);
-        changed.map(|p| (p.name.clone(), p.proposed)).collect()
+        self.changed().map(|p| (p.name.clone(), p.proposed)).collect()
     }
 }
 

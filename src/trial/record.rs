@@ -2,7 +2,7 @@
 
 use super::{
     CHANGED, DrawnRange, ExpectedResult, FallRisk, JudgedBy, MeasuredJump, ParameterValues, ProposalSource,
-    RepeatRecord, Verdict, other_gains,
+    ProposedParameter, RepeatRecord, Verdict, other_gains,
 };
 
 /// A row of the trial table.
@@ -61,6 +61,19 @@ impl TrialRecord {
     pub fn was_not_run(&self) -> bool {
         let refused = [REMOVED, SKIPPED].contains(&self.cause.as_str()) || self.cause.starts_with(NOT_RUN);
         self.verdict == Some(Verdict::Void) && refused
+    }
+
+    /// Returns its value of a parameter or gain.
+    pub fn ran_with(&self, name: &str) -> Option<f64> {
+        self.parameters.get(name).or_else(|| self.gains.get(name))
+    }
+
+    /// Returns its values in place of proposed ones; empty in older recordings and journals.
+    pub fn overrides(&self) -> Vec<ProposedParameter> {
+        let own = |(name, proposed): &(String, f64)| {
+            Some(ProposedParameter { name: name.clone(), value: self.ran_with(name)?, proposed: *proposed })
+        };
+        self.proposed.iter().filter_map(own).collect()
     }
 
     /// Whether its value was measured by hand.

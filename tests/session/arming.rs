@@ -304,6 +304,15 @@ impl Session {
         session
     }
 
+    /// Trial and revision of the newest proposal.
+    fn proposal(&self) -> (u32, u32) {
+        let proposal = self.records.iter().rev().find_map(|record| match record {
+            Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
+            _ => None,
+        });
+        proposal.expect("a proposal")
+    }
+
     fn faults_told(&self) -> Vec<String> {
         let faults = self.records.iter().filter_map(|record| match record {
             Record::Transition(change) if change.to == Mode::Fault => Some(change.cause.clone()),
@@ -481,11 +490,7 @@ fn a_limit_that_ends_a_trial_is_logged_with_its_key() {
     assert!(session.request(OperatorRequest::Arm).accepted);
     session.ticks(4000);
     assert_eq!(session.body.mode(), Mode::Ready);
-    let proposal = session.records.iter().rev().find_map(|record| match record {
-        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
-        _ => None,
-    });
-    let (trial, revision) = proposal.expect("a proposal");
+    let (trial, revision) = session.proposal();
     assert!(session.request(OperatorRequest::Approve { trial, revision }).accepted);
     session.ticks(500);
     session.robot.tamper = |state| state.joint_velocity_rad_s[2] = 90.0;
@@ -612,11 +617,7 @@ fn a_robot_sits_down_at_the_end_of_a_trial_if_so_configured() {
         assert!(answer.accepted, "{answer:?}");
         session.ticks(4000);
         assert_eq!(session.body.mode(), Mode::Ready);
-        let proposal = session.records.iter().rev().find_map(|record| match record {
-            Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
-            _ => None,
-        });
-        let (trial, revision) = proposal.expect("a proposal");
+        let (trial, revision) = session.proposal();
         let answer = session.request(OperatorRequest::Approve { trial, revision });
         assert!(answer.accepted, "{answer:?}");
         session.records.clear();
@@ -651,11 +652,7 @@ fn an_accepted_request_to_sit_down_in_the_last_jump_sits_the_robot_down() {
         let answer = session.request(OperatorRequest::Override { parameter: parameter.to_owned(), value });
         assert!(answer.accepted, "{answer:?}");
     }
-    let proposal = session.records.iter().rev().find_map(|record| match record {
-        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
-        _ => None,
-    });
-    let (trial, revision) = proposal.expect("a proposal");
+    let (trial, revision) = session.proposal();
     let answer = session.request(OperatorRequest::Approve { trial, revision });
     assert!(answer.accepted, "{answer:?}");
     while session.body.mode() != Mode::Jump {
@@ -685,11 +682,7 @@ fn a_jump_that_is_refused_before_its_countdown_has_the_reason_as_its_cause() {
     assert!(session.request(OperatorRequest::Arm).accepted);
     session.ticks(4000);
     assert_eq!(session.body.mode(), Mode::Ready);
-    let proposal = session.records.iter().rev().find_map(|record| match record {
-        Record::Proposal(proposal) => Some((proposal.trial, proposal.revision)),
-        _ => None,
-    });
-    let (trial, revision) = proposal.expect("a proposal");
+    let (trial, revision) = session.proposal();
     let time_ns = session.time_ms * 1_000_000;
     let request = OperatorRequest::Approve { trial, revision };
     session.supervisor.handle_request(&StampedRequest { request, stops: 0, time_ns }, time_ns);

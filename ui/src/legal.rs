@@ -274,8 +274,7 @@ fn may_fix(model: &Model) -> Legality {
 
 fn may_clear_overrides(model: &Model) -> Legality {
     may_change_proposal(model)?;
-    let changed =
-        |proposal: &Proposal| proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed);
+    let changed = |proposal: &Proposal| proposal.changed().next().is_some();
     require(model.session.open_proposal().is_some_and(changed), "nothing was overridden")
 }
 

@@ -11,7 +11,7 @@ use super::study_attributes::{FixedFrom, StudyAttributes};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
-use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, Verdict, counted, six_digits};
+use crate::trial::{FixedParameter, ParameterInfo, SearchStatus, SearchedParameter, Verdict, six_digits};
 
 impl FixedFrom {
     /// Returns the number of trials for which `name` is still fixed. A trial uses one up that has the fixed value, also
@@ -37,7 +37,7 @@ pub fn fixed_in_words(study: &Study) -> Vec<String> {
         let FixedFrom { value, trials, from } = fixed;
         let (value, left) = (six_digits(*value), fixed.trials_left(name, study.trials()));
         let trials =
-            format!("{} that count{}", counted(*trials as usize, "trial"), if *trials == 1 { "s" } else { "" });
+            if *trials == 1 { "1 trial that counts".to_owned() } else { format!("{trials} trials that count") };
         match left {
             0 => format!("{name} was fixed at {value} for {trials}, from trial {from}"),
             left => format!("{name} is fixed at {value} for {trials}, from trial {from}: {left} left"),

@@ -64,8 +64,8 @@ impl Experiment {
     pub fn overrides_in_words(&self) -> String {
         let Some(proposal) = self.proposal() else { return String::new() };
         let units: Vec<&ParameterInfo> = self.plan.parameters.iter().chain(&self.plan.gains).collect();
-        let changed = proposal.parameters.iter().chain(&proposal.gains).filter(|p| p.value != p.proposed);
-        let words: Vec<String> = changed
+        let words: Vec<String> = proposal
+            .changed()
             .map(|p| {
                 let unit = units.iter().find(|info| info.name == p.name).map_or("", |info| &info.unit);
                 format!("{} {} {unit}", p.name, six_digits(p.value)).trim_end().to_owned()

@@ -21,7 +21,7 @@ use crate::realtime::channel::SessionPorts;
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
 use crate::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, Stamped, Transition};
 use crate::recording::recorder::{CollectedTicks, RecorderStatus, RecorderWatch, TrialTicks};
-use crate::telemetry::{Command, CommandRefusal, Event, Mode, TransitionCause, TrialEnd};
+use crate::telemetry::{Command, Event, Mode, TransitionCause, TrialEnd};
 use crate::trial::{Approval, ExperimentStage};
 use unattended::Unattended;
 use unfinished::{Asker, JobPurpose, UnfinishedJob};
@@ -400,11 +400,7 @@ impl Supervisor {
                 self.log(LogLevel::Warning, message, time_ns);
                 match command {
                     Command::RunTrial(spec, _) => {
-                        let end = match because {
-                            CommandRefusal::Inhibited(inhibit) => TrialEnd::NotReady(inhibit),
-                            refusal => TrialEnd::Refused(refusal),
-                        };
-                        self.ended = Some(Ended { trial: spec.trial, end, ticks: 0, time_ns });
+                        self.ended = Some(Ended { trial: spec.trial, end: because.into(), ticks: 0, time_ns });
                         self.unmeasured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),

@@ -129,8 +129,8 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
         let (judged, budget) = (model.session.counted(), model.session.budget());
         lines.push(Line::from(format!("{judged} of {budget} trials count so far; --resume continues the study.")));
         if let Some(proposal) = model.session.open_proposal() {
-            let changed = proposal.parameters.iter().chain(&proposal.gains).any(|p| p.value != p.proposed);
-            let values = if changed { "with the values set here" } else { "with these values" };
+            let values =
+                if proposal.changed().next().is_some() { "with the values set here" } else { "with these values" };
             let trial = proposal.trial;
             lines.push(Line::from(format!("Trial #{trial} is not run: it is proposed again then, {values}.")));
         }
