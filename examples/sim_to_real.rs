@@ -2,7 +2,7 @@
 //! members of the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `jobs`. Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
+//! `trials`, `seed`, `jobs`, `least_p_stand`. Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
 //! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`optimum`]): the largest of many noisy values would be
@@ -84,6 +84,7 @@ impl Proposer {
 struct KnownTask {
     name: String,
     plan: PriorPlan,
+    sampler: SamplerConfig,
     space: Space,
     prior: Arc<PriorModel>,
     mirrored: Arc<PriorModel>,
@@ -140,7 +141,7 @@ impl<'a> Jumper<'a> {
 }
 
 fn new_study(task: &KnownTask, proposer: Proposer, seed: u32) -> Study {
-    let sampler = SamplerConfig { kind: proposer.kind(), seed, ..SamplerConfig::default() };
+    let sampler = SamplerConfig { kind: proposer.kind(), seed, ..task.sampler.clone() };
     let options = StudyOptions {
         name: proposer.name().to_owned(),
         direction: Direction::Maximize,
@@ -240,7 +241,7 @@ fn targets(plan: &PriorPlan, count: usize, seed: u32) -> Vec<Target> {
     (0..count).map(target).collect()
 }
 
-fn known(name: &str, jobs: usize) -> KnownTask {
+fn known(name: &str, jobs: usize, sampler: SamplerConfig) -> KnownTask {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let continuous = name == "continuous";
     let mut config = Config::load(continuous.then(|| root.join("examples/continuous")).as_deref()).expect("loads");
@@ -259,6 +260,7 @@ fn known(name: &str, jobs: usize) -> KnownTask {
         Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)))).expect("a space");
     let mut task = KnownTask {
         name: name.to_owned(),
+        sampler,
         space,
         prior: Arc::new(PriorModel::new(prior)),
         mirrored: Arc::new(PriorModel::new(mirrored)),
@@ -299,6 +301,7 @@ fn main() {
         ("trials", "20"),
         ("seed", "9000"),
         ("jobs", ""),
+        ("least_p_stand", "0.75"),
     ]
     .map(|(key, value)| (key.to_owned(), value.to_owned()))
     .into();
@@ -311,6 +314,8 @@ fn main() {
     let jobs = if settings["jobs"].is_empty() { cores() } else { number("jobs") };
     let (robots, studies, trials, seed) =
         (number("robots").max(4), number("studies"), number("trials"), number("seed"));
+    let least_p_stand = settings["least_p_stand"].parse().expect("`least_p_stand` is a number");
+    let sampler = SamplerConfig { least_p_stand, ..SamplerConfig::default() };
     let wanted = &settings["samplers"];
     let proposers: Vec<Proposer> = Proposer::ALL
         .iter()
@@ -330,7 +335,7 @@ fn main() {
     println!("|---|---|{}---|---|", "---|".repeat(AFTER.len()));
     let mut notes = String::new();
     for name in settings["tasks"].split(',') {
-        let task = known(name, jobs);
+        let task = known(name, jobs, sampler.clone());
         let targets = targets(&task.plan, robots, seed as u32);
         let mut work = Vec::new();
         for target in 0..robots {

@@ -105,7 +105,7 @@ fn a_key_that_the_defaults_leave_out_may_be_given() {
     )
     .unwrap();
     let config = Config::load(Some(folder.path())).unwrap();
-    assert_eq!((config.optimize.sampler.startup_trials, config.optimize.sampler.least_p_stand), (Some(5), Some(0.9)));
+    assert_eq!((config.optimize.sampler.startup_trials, config.optimize.sampler.least_p_stand), (Some(5), 0.9));
     refuses("optimize.toml", "[sampler]\nleast_p_stand = 1.0\n", &["sampler.least_p_stand", "0.99"]);
     refuses("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n", &["sampler.startup_trials", "whole number"]);
 }

@@ -147,7 +147,6 @@ fn every_accepted_number_of_optimize_toml_runs_a_study() {
     let (end, ticks) = trial(&Config::load(None).unwrap(), &go1()).unwrap();
     let text = include_str!("../config/optimize.toml")
         .replace("# startup_trials", "startup_trials")
-        .replace("# least_p_stand", "least_p_stand")
         .replace("# [first.forward]", "[first.forward]\nFz = 270.0")
         .replace("# f0 = 1.3", "f0 = 1.3")
         .replace("# Fx = 120.0", "Fx = 120.0");

@@ -38,7 +38,6 @@ twist-cw = { duration_s = 1.0 }
         "objective = \"truth\"
 [sampler]
 startup_trials = 10
-least_p_stand = 0.75
 [first]
 forward = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }
 lateral-left = { f0 = 1.0, f1 = 1.0, Fx = 1.0, Fy = 1.0, Fz = 1.0, kp = 1.0, kd = 1.0, kd_joint = 1.0, k_att = 1.0 }

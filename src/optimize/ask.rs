@@ -72,13 +72,9 @@ pub struct SamplerConfig {
     pub startup_trials: Option<usize>,
     /// TPE: candidates drawn from l(x) for one proposal.
     pub candidates: usize,
-    /// `sim`: probability of standing, 0..1, below which no gain is worth a jump. Default: [`LEAST_P_STAND`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub least_p_stand: Option<f64>,
+    /// `sim`: probability of standing, 0..1, below which no gain is worth a jump (`src/optimize/README.md`, "Ask").
+    pub least_p_stand: f64,
 }
-
-/// [`SamplerConfig::least_p_stand`] where it is left out (`src/optimize/README.md`, "Ask").
-pub const LEAST_P_STAND: f64 = 0.75;
 
 impl Default for SamplerConfig {
     fn default() -> Self {
@@ -88,7 +84,7 @@ impl Default for SamplerConfig {
             seed: 0,
             startup_trials: None,
             candidates: 24,
-            least_p_stand: None,
+            least_p_stand: 0.75,
         }
     }
 }

@@ -157,7 +157,7 @@ fn values_tell_where_the_robot_stands() {
 /// A proposal that is worth its risk stands at least as surely as the key asks.
 #[test]
 fn proposals_stand_as_surely_as_the_key_asks() {
-    let proposals = |least_p_stand: Option<f64>| -> Vec<Expectation> {
+    let proposals = |least_p_stand: f64| -> Vec<Expectation> {
         let mut study = in_memory(options(space(), SamplerConfig { least_p_stand, ..sampler(SamplerKind::Sim, 0) }));
         study.use_prior(RIGHT.clone());
         let next = |_| {
@@ -168,12 +168,12 @@ fn proposals_stand_as_surely_as_the_key_asks() {
         (0..5).map(next).collect()
     };
     for least in [0.0, 0.75, 0.85] {
-        let worth: Vec<Expectation> = proposals(Some(least)).into_iter().filter(|e| e.worth_the_risk).collect();
+        let worth: Vec<Expectation> = proposals(least).into_iter().filter(|e| e.worth_the_risk).collect();
         println!("asked {least}: {:.3?}", worth.iter().map(|e| e.p_stand).collect::<Vec<_>>());
         assert!(!worth.is_empty() && worth.iter().all(|e| e.p_stand >= least), "{worth:?}, asked {least}");
     }
-    assert_eq!(proposals(Some(0.75)), proposals(None));
-    assert_ne!(proposals(Some(0.85)), proposals(None));
+    assert_eq!(SamplerConfig::default().least_p_stand, 0.75);
+    assert_ne!(proposals(0.85), proposals(0.75));
 }
 
 /// After 10 jumps within 10 % of `gp`, whose first points are free of the simulator.

@@ -11,7 +11,7 @@ pub mod safeguard;
 pub mod search;
 pub mod worlds;
 
-use super::ask::{Ask, Candidate, Direction, Expectation, LEAST_P_STAND, Prediction, Streams};
+use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::gp;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
@@ -45,7 +45,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
         let ensemble = prior.ensemble()?;
         let history = History::gather(prior, ensemble, ask.trials, ask.direction);
         let models = models(ensemble, &history)?;
-        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[], least_p_stand(ask))?;
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[], ask.config.least_p_stand)?;
         let prediction = |jump: &Jump| {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, .. } =
@@ -55,11 +55,6 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
         Some(history.jumps.iter().map(prediction).collect())
     };
     covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
-}
-
-/// The probability of standing below which no gain is worth a jump.
-fn least_p_stand(ask: &Ask<'_>) -> f64 {
-    ask.config.least_p_stand.unwrap_or(LEAST_P_STAND)
 }
 
 /// The models of value and standing. `None` if a covariance cannot be factored.
@@ -76,7 +71,8 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, least_p_stand(ask))?;
+    let acquisition =
+        Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config.least_p_stand)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {
