@@ -14,7 +14,7 @@ use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
     Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, Proposal, ProposalInsight,
-    ProposalSource, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
+    ProposalSource, ProposedParameter, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, ExportedRows, Msg};
@@ -216,8 +216,8 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         let screen = console.screen(columns, rows);
         let why = line_with(&screen, "TPE ");
         assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
-        let importance = if columns < 200 { "importance 62 %" } else { "importance for the best tenth 62 %" };
-        assert!(why.contains(importance), "{why}");
+        assert!(why.contains("importance 62 %"), "{why}");
+        assert_eq!(screen.contains("importance: for best tenth"), columns > 80, "{screen}");
         assert!(why.contains("Fx") && why.contains("Fz"), "{why}");
         // Peak and proposal of the good trials are at a quarter of the panel, the peak of the rest at three quarters.
         let width = why.find("Fx").map(|_| usize::from(columns) / 3).expect("three panels");
@@ -230,6 +230,24 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         assert!(good < width / 2 && rest > width / 2, "{good}, {rest} of {width}:\n{screen}");
         assert!(letter("│").expect("the proposal") < width / 2, "{screen}");
     }
+}
+
+/// Regression: after an override the view showed two different lines, both explained as the proposal.
+#[test]
+fn an_override_is_the_proposal_beside_the_value_of_the_sampler() {
+    let mut console = Console::proposed();
+    let mut overridden = proposal(12, 0);
+    overridden.parameters[0] = ProposedParameter { value: 1.5, proposed: 1.0, ..overridden.parameters[0].clone() };
+    console.record(Record::Proposal(overridden));
+    console.stage(ExperimentStage::Proposed, 12);
+    console.record(Record::Insight(insight()));
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["│ proposal  │ of the sampler  g good"]);
+    let lines: Vec<usize> =
+        screen.lines().rev().filter(|line| line.contains('│')).map(|line| line.matches('│').count()).collect();
+    assert_eq!(screen.lines().filter(|line| line.contains("1.500")).count(), 2, "below both panels:\n{screen}");
+    assert!(lines[1..4].iter().all(|count| *count >= 2), "{lines:?}\n{screen}");
 }
 
 #[test]
@@ -313,7 +331,10 @@ fn the_signs_of_the_optimizer_are_explained_at_every_size() {
         let legend = line_with(&console.screen(columns, rows), "o accept  x");
         assert_shows(&legend, &[&signs[..5], &["? not judged", "g good", "r rest"]].concat());
         let last = legend.split("  ").last().unwrap_or_default();
-        assert!(["r rest", "─ best so far"].contains(&last.trim()), "a sign is whole or left out: {legend}");
+        assert!(
+            ["r rest", "─ best so far", "importance: for best tenth"].contains(&last.trim()),
+            "a sign is whole or left out: {legend}"
+        );
     }
 }
 

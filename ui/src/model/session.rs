@@ -80,6 +80,11 @@ impl SessionModel {
         self.proposal.as_ref().filter(|proposal| proposal.trial == trial)
     }
 
+    /// The value that the operator gave a parameter of the open proposal.
+    pub fn override_of(&self, parameter: &str) -> Option<f64> {
+        self.open_proposal()?.changed().find(|changed| changed.name == parameter).map(|changed| changed.value)
+    }
+
     /// The open proposal, or that of the running trial.
     pub fn shown_proposal(&self) -> Option<&Proposal> {
         let running = self.trial_in(ExperimentStage::Running);

@@ -45,6 +45,8 @@ enum StudySubcommand {
         study: StudySelector,
     },
     /// Export all trials as a table with the columns of Optuna's trials_dataframe
+    ///
+    /// The column `duration` is the time from the proposal of a trial to its verdict, with the operator's pauses. Times are UTC.
     Export {
         #[command(flatten)]
         study: StudySelector,

@@ -4,6 +4,7 @@
 
 use quadfrog::trial::{ParameterInfo, ParameterInsight, ProposalInsight};
 use ratatui::Frame;
+use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
@@ -19,12 +20,11 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     let modelled = insight.is_some_and(|insight| !insight.predicted.is_empty());
     let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
     let importance = parameter.and_then(|parameter| parameter.importance);
-    let of_best = if area.width >= 58 && !modelled { " for the best tenth" } else { "" };
-    let aside = importance.map_or(String::new(), |share| format!("importance{of_best} {:.0} %", share * 100.0));
+    let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
     let body = heading(frame, area, theme, &title(insight, modelled, &info.name, area.width), &aside);
     let drawn = match insight {
         Some(insight) if modelled => render_prediction(frame, body, session, insight, info, theme),
-        _ => parameter.is_some_and(|parameter| render_densities(frame, body, parameter, info, theme)),
+        _ => parameter.is_some_and(|parameter| render_densities(frame, body, session, parameter, info, theme)),
     };
     if !drawn && body.height > 0 {
         let reason = match (insight, &session.insight) {
@@ -63,8 +63,11 @@ fn render_prediction(
     let (low, high) = ends.fold((0.0_f64, 1e-3_f64), |(low, high), value| (low.min(value), high.max(value)));
     let Some(axes) = ParameterAxes::new(info, area, (low, high)) else { return false };
     let buffer = frame.buffer_mut();
-    let proposed = insight.parameters.iter().find(|p| p.name == info.name).map(|p| p.proposed);
-    axes.draw(buffer, proposed, theme);
+    if let Some(parameter) = insight.parameters.iter().find(|p| p.name == info.name) {
+        draw_proposed(buffer, &axes, session, parameter, theme);
+    } else {
+        axes.draw(buffer, None, theme);
+    }
     let points = || {
         insight.predicted.iter().filter_map(|predicted| {
             let trial = session.trials.records.get(&predicted.trial)?;
@@ -86,9 +89,25 @@ fn render_prediction(
     true
 }
 
+/// The axes with the value that the sampler proposed, and that of an override as the proposal beside it.
+fn draw_proposed(
+    buffer: &mut Buffer,
+    axes: &ParameterAxes,
+    session: &SessionModel,
+    sampled: &ParameterInsight,
+    theme: &Theme,
+) {
+    let overridden = session.override_of(&sampled.name);
+    if overridden.is_some() {
+        axes.draw_line(buffer, sampled.proposed, theme, Role::Quiet);
+    }
+    axes.draw(buffer, overridden.or(Some(sampled.proposed)), theme);
+}
+
 fn render_densities(
     frame: &mut Frame,
     area: Rect,
+    session: &SessionModel,
     insight: &ParameterInsight,
     info: &ParameterInfo,
     theme: &Theme,
@@ -110,7 +129,7 @@ fn render_densities(
         points.windows(2).for_each(|pair| dots.line(pair[0], pair[1]));
         dots.draw(buffer, plot, theme.style(role));
     }
-    axes.draw(buffer, Some(insight.proposed), theme);
+    draw_proposed(buffer, &axes, session, insight, theme);
     // A letter at each curve's peak distinguishes the curves without colours; the legend explains the letters.
     for (density, role, letter) in curves {
         let Some((x, y)) = insight.at.iter().zip(density).max_by(|a, b| a.1.total_cmp(b.1)) else { continue };

@@ -130,14 +130,20 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
         (false, false, false) => None,
     };
     items.extend(line.map(|(role, text)| (theme.bar(), role, text)));
+    if reasons && session.open_proposal().is_some_and(|proposal| proposal.changed().next().is_some()) {
+        items.push((theme.bar(), Role::Quiet, "of the sampler"));
+    }
     if densities && !modelled {
         items.extend([("g", Role::Good, "good"), ("r", Role::SeriesB, "rest")]);
     }
     items.push((theme.line(), Role::Quiet, "best so far"));
+    if session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| p.importance.is_some())) {
+        items.push(("importance:", Role::Quiet, "for best tenth"));
+    }
     let mut spans = vec![Span::raw(" ")];
     let mut left = usize::from(area.width.saturating_sub(1));
     for (symbol, role, text) in items {
-        let Some(rest) = left.checked_sub(text.len() + 4) else { break };
+        let Some(rest) = left.checked_sub(symbol.chars().count() + text.len() + 3) else { break };
         left = rest;
         spans.extend([span(theme, role, symbol), span(theme, Role::Quiet, format!(" {text}  "))]);
     }

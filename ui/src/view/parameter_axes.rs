@@ -64,14 +64,19 @@ impl<'a> ParameterAxes<'a> {
         let right = bounds.right().saturating_sub(high.len() as u16);
         buffer.set_string(right, bounds.y, high, quiet);
         let Some(proposed) = proposed else { return };
-        for y in plot.y..plot.bottom() {
-            buffer.set_string(self.column(proposed), y, theme.bar(), theme.style(Role::Key));
-        }
+        self.draw_line(buffer, proposed, theme, Role::Key);
         let now = number(proposed);
         let (first, last) = (bounds.x + low.len() as u16 + 1, right.saturating_sub(now.len() as u16 + 1));
         if first <= last {
             let x = self.column(proposed).saturating_sub(now.len() as u16 / 2).clamp(first, last);
             buffer.set_string(x, bounds.y, now, theme.style(Role::Key));
+        }
+    }
+
+    /// Draws a line at a value of the parameter.
+    pub fn draw_line(&self, buffer: &mut Buffer, value: f64, theme: &Theme, role: Role) {
+        for y in self.plot.y..self.plot.bottom() {
+            buffer.set_string(self.column(value), y, theme.bar(), theme.style(role));
         }
     }
 }
