@@ -113,6 +113,39 @@ fn unusable_arguments_are_refused_with_the_remedy() {
     assert!(!program.path("t.parquet").exists() && !program.path("t.dat").exists());
 }
 
+/// Regression: a slip in a file's name replaced the journal of a study by a picture, and a recording by a table.
+#[test]
+fn no_file_of_another_kind_is_replaced() {
+    let program = Program::new();
+    let recording = recording(&program);
+    let study = program.study("recordings");
+    let journal = study.join("study.log").to_str().unwrap().to_owned();
+    let unfinished = format!("{recording}.part");
+    fs::write(&unfinished, "the beginning of a session").unwrap();
+    std::os::unix::fs::symlink(&journal, program.path("link.csv")).unwrap();
+    let kept = [&journal, &recording, &unfinished];
+    let contents = || kept.map(|file| fs::read(file).unwrap());
+    let before = contents();
+    let folder = study.to_str().unwrap();
+    for file in [&journal, &recording, "link.csv"] {
+        let exists = [file, "exists", ".csv", "another name"];
+        assert_shows(&program.refused(&["study", "export", folder, "--format", "csv", "-o", file]), &exists);
+        assert_shows(&program.refused(&["export", &recording, "--format", "csv", "-o", file]), &exists);
+    }
+    for file in [&journal, "new.png"] {
+        let screenshot = program.refused(&["screenshot", &recording, "-o", file]);
+        assert_shows(&screenshot, &[file, "a screenshot is a picture in SVG", ".svg"]);
+        assert_shows(&program.refused(&["report", folder, "--output", file]), &[file, "HTML", ".html"]);
+    }
+    assert!(!program.path("new.png").exists());
+    // What the same command wrote is replaced.
+    for _ in 0..2 {
+        program.text(&["study", "export", folder, "-o", "trials.csv"]);
+        program.text(&["screenshot", &recording, "-o", "last.svg"]);
+    }
+    assert!(contents() == before, "a file was replaced");
+}
+
 #[test]
 fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
     let program = Program::new();
@@ -137,7 +170,8 @@ fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
     let (status, message) = with_small_files(&program, 200, &["export", &recording, "-o", "all.parquet"]);
     assert_eq!(status, Some(1), "{message}");
     assert_shows(&message, &["all.parquet", "File too large"]);
-    assert!(!program.path("all.parquet").exists() && !program.path("all.parquet.part").exists());
+    let left = fs::read_dir(program.path("")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    assert_eq!(left.filter(|name| name.contains("all.parquet")).count(), 0);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = program.command(&["export", &recording, "--format", "json"]).stdout(full).output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr);

@@ -110,8 +110,9 @@ def exact_sensors(*state):
 
 
 def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
-    """One jump. `motors` gives the torques of a tick from demanded torques and joint speeds; `sensors` what the controller reads of joint
-    positions and speeds and of the trunk's angular and linear velocity in its own frame."""
+    """One jump, or `jumps` of the case in a row with the frequency `f1_hz` between them. `motors` gives the torques of a tick from demanded
+    torques and joint speeds; `sensors` what the controller reads of joint positions and speeds and of the trunk's angular and linear
+    velocity in its own frame."""
     landing = terms["landing"]
     d = mujoco.MjData(m)
     d.qpos[:7] = [0, 0, -STANCE[2] + FOOT_RADIUS, 1, 0, 0, 0]
@@ -119,10 +120,12 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
     mujoco.mj_forward(m, d)
     leg_of = {m.geom(name).id: leg for leg, name in enumerate(LEGS)}
     start, impulse = 1.0, 0.5 / case["f0_hz"]
+    period = impulse + 0.5 / case.get("f1_hz", 1.0)
+    end = start + (case.get("jumps", 1) - 1) * period + impulse
     expect = dict(fell=False, takeoff_s=None, apex_rise_m=0.0)
     yaw, last_yaw, origin, airborne = 0.0, 0.0, None, 0
     swing, lost, landed = np.zeros(4, bool), np.zeros(4, int), [None] * 4
-    for tick in range(int(round((start + impulse + 1.5) * 1000))):
+    for tick in range(int(round((end + 1.5) * 1000))):
         t = tick * 0.001
         rotation = d.xmat[1].reshape(3, 3)
         contact = np.zeros(4, bool)
@@ -135,7 +138,7 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
         last_yaw = heading
         if origin is None and t >= start - 1e-9:
             origin, initial_yaw = d.qpos[:3].copy(), yaw
-        since = t - start if start - 1e-9 <= t < start + impulse else -1.0
+        since = (t - start) % period if start - 1e-9 <= t < end else -1.0
         theta = np.pi + 2 * np.pi * case["f0_hz"] * max(since, 0.0)
         force = np.sin(theta) if -1e-9 <= since < impulse else 0.0
         if t > start:

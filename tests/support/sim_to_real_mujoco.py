@@ -7,7 +7,8 @@
 Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, motors with
 lag and a torque-speed curve, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Prints a
 JSON line for each study: the value of the best trial after 1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls
-as 0 and counted. SI units, radians.
+as 0 and counted. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a folder with
+that task, as examples/continuous without its first point. SI units, radians.
 """
 
 import argparse
@@ -22,6 +23,7 @@ PAPER = dict(
 )
 NO_LOAD_SPEED = 30.1
 AFTER = [1, 3, 5, 10, 20]
+IN_A_ROW = 5
 
 
 class Robot:
@@ -52,17 +54,21 @@ class Robot:
             noise = lambda size, deviation: random.normal(0, deviation, size)
             return q + noise(12, 0.001), speed + noise(12, 0.1), omega + noise(3, 0.02), velocity
 
-        case = dict(task=task, f0_hz=params["f0"], Fx_n=params.get("Fx", 0.0), Fy_n=params.get("Fy", 0.0), Fz_n=params["Fz"])
+        case = dict(f0_hz=params["f0"], Fx_n=params.get("Fx", 0.0), Fy_n=params.get("Fy", 0.0), Fz_n=params["Fz"])
+        if task == "continuous":
+            case.update(task="forward", f1_hz=params["f1"], jumps=IN_A_ROW)
+        else:
+            case.update(task=task)
         outcome = jump(self.m, self.limits, case, PAPER, motors, sensors)
         if outcome["fell"]:
             return None
-        along = dict(forward=outcome["displacement_m"][0], **{"lateral-left": outcome["displacement_m"][1]})
-        return along.get(task, outcome["yaw_change_rad"])
+        x, y, _ = outcome["displacement_m"]
+        return {"forward": x, "lateral-left": y, "continuous": x / IN_A_ROW}.get(task, outcome["yaw_change_rad"])
 
 
-def study(program, task, sampler, seed, config):
+def study(program, task, sampler, seed, config, jumps):
     robot = Robot(seed)
-    command = [program, "ask-tell", "--task", task, "--sampler", sampler, "--seed", str(seed)]
+    command = [program, "ask-tell", "--task", "forward" if task == "continuous" else task, "--sampler", sampler, "--seed", str(seed)]
     talk = subprocess.Popen(command + (["--config", config] if config else []), stdin=-1, stdout=-1, text=True)
 
     def say(message):
@@ -71,7 +77,7 @@ def study(program, task, sampler, seed, config):
         return json.loads(talk.stdout.readline())
 
     trials, best, falls, known = [], [], [], {}
-    for number in range(AFTER[-1]):
+    for number in range(jumps):
         asked = say({"ask": {}})
         value = robot.value(task, asked["params"], 1000 * seed + number)
         verdict = "fall" if value is None else "accept"
@@ -87,7 +93,7 @@ def study(program, task, sampler, seed, config):
     talk.stdin.close()
     talk.wait()
     robot = dict(friction=robot.friction, mass=robot.mass, lag_s=robot.lag_s, full_torque_share=robot.full_torque_share)
-    return dict(task=task, sampler=sampler, seed=seed, after=AFTER, best=best, falls=falls, robot=robot)
+    return dict(task=task, sampler=sampler, seed=seed, after=AFTER[: len(best)], best=best, falls=falls, robot=robot)
 
 
 def main():
@@ -97,12 +103,13 @@ def main():
     parser.add_argument("--samplers", default="sim,gp")
     parser.add_argument("--studies", type=int, default=3)
     parser.add_argument("--seed", type=int, default=7000)
+    parser.add_argument("--jumps", type=int, default=AFTER[-1])
     parser.add_argument("--config")
     arguments = parser.parse_args()
     for task in arguments.tasks.split(","):
         for seed in range(arguments.seed, arguments.seed + arguments.studies):
             for sampler in arguments.samplers.split(","):
-                print(json.dumps(study(arguments.program, task, sampler, seed, arguments.config)), flush=True)
+                print(json.dumps(study(arguments.program, task, sampler, seed, arguments.config, arguments.jumps)), flush=True)
 
 
 if __name__ == "__main__":

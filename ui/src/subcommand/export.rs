@@ -17,7 +17,8 @@ use quadfrog::trial::counted;
 use super::arguments::{one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
-use super::table::{table_format, write_file, written_format};
+use super::output_file::write_file;
+use super::table::{table_format, written_format};
 
 /// Viewer with a layout for recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -29,6 +30,13 @@ enum LayoutOf {
 }
 
 impl LayoutOf {
+    fn extension(self) -> &'static str {
+        match self {
+            LayoutOf::Foxglove => "json",
+            LayoutOf::Rerun => "py",
+        }
+    }
+
     fn contents(self) -> &'static str {
         match self {
             LayoutOf::Foxglove => include_str!("../../data/foxglove-layout.json"),
@@ -94,7 +102,7 @@ fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure>
         output::data(layout.contents());
         return Ok(());
     };
-    write_file(path, |file| file.write_all(layout.contents().as_bytes()))?;
+    write_file(path, layout.extension(), |file| file.write_all(layout.contents().as_bytes()))?;
     notice!("layout: {}", path.display());
     Ok(())
 }
@@ -120,7 +128,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     match &arguments.output {
         Some(path) => {
             let mut rows = 0;
-            write_file(path, |out| {
+            write_file(path, format.into(), |out| {
                 rows = signals.export(&mut players, range, format, out)?;
                 Ok(())
             })?;

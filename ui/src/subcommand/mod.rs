@@ -18,6 +18,7 @@ mod init;
 mod live;
 mod man;
 mod optimize;
+mod output_file;
 mod prior;
 mod recover;
 mod rejudge;

@@ -19,8 +19,11 @@ use quadfrog::recording::timeline::Timeline;
 use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
 use super::failure::Failure;
+use super::output_file::{require_format, write_file};
 use super::replay::recorded_robot;
-use super::table::write_file;
+
+/// Of the pictures.
+const EXTENSION: &str = "svg";
 
 #[derive(Debug, Args)]
 pub struct ScreenshotArguments {
@@ -87,6 +90,9 @@ fn parse_size(text: &str) -> Result<(u16, u16), String> {
 
 /// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
 pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
+    if let Some(path) = &arguments.output {
+        require_format(path, EXTENSION, "a screenshot is a picture in SVG")?;
+    }
     let config = arguments::load_config(arguments.config.as_deref())?;
     let mut recording = Timeline::open(&recordings_of(&arguments.file)?)?;
     let time_ns = match (arguments.trial, arguments.time) {
@@ -125,7 +131,7 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let picture = film.svg(rate);
     match &arguments.output {
         Some(path) => {
-            write_file(path, |file| file.write_all(picture.as_bytes()))?;
+            write_file(path, EXTENSION, |file| file.write_all(picture.as_bytes()))?;
             notice!("screenshot: {}", path.display());
             Ok(())
         }

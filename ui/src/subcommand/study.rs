@@ -22,8 +22,9 @@ use serde_json::Value;
 
 use super::completion;
 use super::failure::Failure;
+use super::output_file::write_file;
 use super::selection::parse_storage;
-use super::table::{format_of_name, table_format, write_file, written_format};
+use super::table::{format_of_name, table_format, written_format};
 
 #[derive(Debug, Args)]
 pub struct StudyCommand {
@@ -300,7 +301,7 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
     let study = &opened.study;
     let columns = trial_columns::of(study.trials(), study.metric_name(), |number| study.note_of(number));
     if let Some(path) = output {
-        write_file(path, |file| {
+        write_file(path, format.into(), |file| {
             let mut table = TableWriter::new(format, file, &columns)?;
             table.write(&columns)?;
             table.finish()

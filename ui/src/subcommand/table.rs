@@ -1,10 +1,7 @@
-//! Tables that commands write: their format, by `--format` or the name of the file, and the file itself.
+//! The format of tables that commands write, by `--format` or the name of the file.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::anyhow;
 use clap::builder::TypedValueParser;
 use quadfrog::report::columns::TableFormat;
 
@@ -50,30 +47,4 @@ pub fn written_format(given: Option<TableFormat>, file: Option<&Path>) -> Result
             file.display()
         ))),
     }
-}
-
-/// Writes a file: under another name, FILE.part, until it is complete, so that an error leaves no beginning of a table. A
-/// device, a pipe or a link is written in place.
-///
-/// # Errors
-/// When it cannot be written, with the cause.
-pub fn write_file(file: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Failure> {
-    let whole = |file: File| {
-        let mut file = BufWriter::new(file);
-        write(&mut file)?;
-        file.into_inner().map_err(io::IntoInnerError::into_error)
-    };
-    let failed = |error: io::Error| Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()));
-    if fs::symlink_metadata(file).is_ok_and(|about| !about.is_file()) {
-        let opened = OpenOptions::new().write(true).truncate(true).open(file);
-        return opened.and_then(whole).map(drop).map_err(failed);
-    }
-    let mut part = file.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
-    let synced = File::create(&part).and_then(whole).and_then(|file| file.sync_all());
-    synced.and_then(|()| fs::rename(&part, file)).map_err(|error| {
-        let _ = fs::remove_file(&part);
-        failed(error)
-    })
 }

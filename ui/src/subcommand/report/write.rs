@@ -7,12 +7,14 @@ use anyhow::Context;
 use quadfrog::report::{html, svg};
 
 use crate::subcommand::failure::Failure;
+use crate::subcommand::output_file::{require_format, write_whole};
 
 /// Writes a page; an existing file is replaced only if it is a report.
 ///
 /// # Errors
-/// When the file is something else, its folder does not exist, or it cannot be written.
+/// When the name is not that of a page, the file is something else, its folder does not exist, or it cannot be written.
 pub fn write_page(file: &Path, text: &str) -> Result<(), Failure> {
+    require_format(file, "html", "a report is a page in HTML")?;
     check(file, "--output", html::is_report)?;
     write(file, text)
 }
@@ -63,14 +65,6 @@ fn check(file: &Path, option: &str, is_ours: fn(&str) -> bool) -> Result<(), Fai
 }
 
 fn write(file: &Path, text: &str) -> Result<(), Failure> {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let part = file.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let written = std::fs::File::create(&part)
-        .and_then(|mut to| to.write_all(text.as_bytes()).and_then(|()| to.sync_all()))
-        .and_then(|()| std::fs::rename(&part, file));
-    if written.is_err() {
-        // The error that is reported is that of the writing.
-        let _ = std::fs::remove_file(&part);
-    }
+    let written = write_whole(file, |to| to.write_all(text.as_bytes()));
     written.with_context(|| format!("{}: cannot be written", file.display())).map_err(Failure::Other)
 }

@@ -1,0 +1,82 @@
+//! Files that commands write for their user: whole or not at all, and never over a file of another kind.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter};
+use std::path::Path;
+
+use anyhow::anyhow;
+
+use super::failure::Failure;
+
+/// Writes a file, as [`write_whole`]. A device or a pipe is written in place. An existing file is replaced only where its name, after
+/// links, ends in `.extension`: a journal, a recording or a script is none of the tables and pictures that commands write.
+///
+/// # Errors
+/// When a file of another kind exists, before anything is written; when it cannot be written, with the cause.
+pub fn write_file(
+    file: &Path,
+    extension: &str,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), Failure> {
+    // What does not exist, or leads nowhere, is written as it is named.
+    let place = fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
+    match fs::metadata(&place) {
+        Ok(about) if about.is_dir() => {
+            Err(Failure::input(format!("--output {}: it is a folder; give the name of a file in it", file.display())))
+        }
+        Ok(about) if !about.is_file() => {
+            let opened = OpenOptions::new().write(true).open(&place);
+            opened.and_then(|opened| whole(opened, write)).map(drop).map_err(|error| not_written(file, &error))
+        }
+        Ok(_) if !has_extension(&place, extension) => Err(Failure::input(format!(
+            "--output {}: the file exists and its name does not end in .{extension}; give another name or remove it",
+            file.display()
+        ))),
+        _ => write_whole(&place, write).map_err(|error| not_written(file, &error)),
+    }
+}
+
+/// Refuses a name that says another format; one that says none passes. `contents` names what is written: "a report is a page in HTML".
+pub fn require_format(file: &Path, extension: &str, contents: &str) -> Result<(), Failure> {
+    match file.extension() {
+        Some(other) if !has_extension(file, extension) => Err(Failure::input(format!(
+            "--output {}: {contents}, not .{}; end its name in .{extension}",
+            file.display(),
+            other.to_string_lossy()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// In capital letters or not.
+fn has_extension(file: &Path, extension: &str) -> bool {
+    file.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
+}
+
+/// Writes a file under another name beside its place until it is complete, so that an error leaves what was there.
+///
+/// # Errors
+/// Those of the file system.
+pub fn write_whole(file: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let part = file.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let written = File::create(&part)
+        .and_then(|part| whole(part, write))
+        .and_then(|part| part.sync_all())
+        .and_then(|()| fs::rename(&part, file));
+    if written.is_err() {
+        // The error that is reported is that of the writing.
+        let _ = fs::remove_file(&part);
+    }
+    written
+}
+
+fn whole(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<File> {
+    let mut file = BufWriter::new(file);
+    write(&mut file)?;
+    file.into_inner().map_err(io::IntoInnerError::into_error)
+}
+
+fn not_written(file: &Path, error: &io::Error) -> Failure {
+    Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()))
+}
