@@ -3,10 +3,10 @@
 use super::Model;
 use crate::column::Column;
 
-/// Columns of the longest source in the table.
+/// Columns of the longest source in the table and a space, because the words of the cause follow.
 fn source_width(model: &Model) -> usize {
     let rows = model.session.trials.records.values().chain(model.later_trials());
-    rows.map(|row| row.origin().chars().count()).fold(9, usize::max)
+    rows.map(|row| row.origin().chars().count() + 1).fold(9, usize::max)
 }
 
 /// A column with its title, its width in characters and its content.

@@ -38,7 +38,7 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
         Some(lost) => put_line!("The recording is not complete: {lost}."),
         None => put_line!("Nothing was lost."),
     }
-    put_line!("{} is unchanged.", file.display());
+    put_line!("{} is unchanged; nothing needs it any more once you have looked at the new file.", file.display());
     Ok(())
 }
 

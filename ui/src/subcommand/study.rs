@@ -306,7 +306,9 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
             table.write(&columns)?;
             table.finish()
         })?;
-        notice!("{}: {}", counted(study.trials().len(), "trial"), path.display());
+        let not_run = opened.rows().iter().filter(|row| row.was_not_run()).count();
+        let of_them = if not_run > 0 { format!(", {not_run} of them not run") } else { String::new() };
+        notice!("{}{of_them}: {}", counted(study.trials().len(), "trial"), path.display());
         return Ok(());
     }
     let mut bytes = Vec::new();
