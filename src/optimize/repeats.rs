@@ -118,14 +118,21 @@ pub fn best(trials: &[Trial], direction: Direction) -> Option<&Trial> {
     improvements(candidates.filter_map(|t| Some((t, t.number, t.value?))), mean, direction).last()
 }
 
-/// The best `count` points by mean value, best first; earlier ones first among equals.
-pub fn contenders(trials: &[Trial], direction: Direction, count: usize) -> Vec<RepeatedPoint> {
-    contenders_of(points(trials), direction, count)
+/// The point of the trial `best`, which a sampler's model may have chosen, then the others by mean value, best first, `count` in all;
+/// earlier ones first among equals.
+pub fn contenders(trials: &[Trial], direction: Direction, count: usize, best: Option<u32>) -> Vec<RepeatedPoint> {
+    contenders_of(points(trials), direction, count, best)
 }
 
-/// The best `count` of some points, as [`contenders`].
-pub fn contenders_of(mut points: Vec<RepeatedPoint>, direction: Direction, count: usize) -> Vec<RepeatedPoint> {
-    points.sort_by(|a, b| direction.best_first(a.mean(), b.mean()));
+/// Some of the points, as [`contenders`].
+pub fn contenders_of(
+    mut points: Vec<RepeatedPoint>,
+    direction: Direction,
+    count: usize,
+    best: Option<u32>,
+) -> Vec<RepeatedPoint> {
+    let is_best = |point: &RepeatedPoint| best.is_some_and(|best| point.trials.contains(&best));
+    points.sort_by(|a, b| is_best(b).cmp(&is_best(a)).then(direction.best_first(a.mean(), b.mean())));
     points.truncate(count);
     points
 }

@@ -147,7 +147,12 @@ pub fn best(group: &[&ReportedStudy]) -> Table {
         Column::number("rise", "m"),
         Column::number("air", "s"),
     ]);
-    let mut table = Table::new(format!("Best trial of each study, {name}."), columns);
+    let chosen = if by_model {
+        " With a model of the sampler that of the best mean by the model: a single jump may be luck."
+    } else {
+        ""
+    };
+    let mut table = Table::new(format!("Best trial of each study, {name}.{chosen}"), columns);
     for study in group {
         let Some(row) = study.best_row() else { continue };
         let own =

@@ -42,7 +42,7 @@ pub fn best_line(
     if let Some(ModelBest { predicted, predicted_deviation, .. }) = model.filter(|model| model.trial == best.trial) {
         let _ = writeln!(
             text,
-            "      mean by the sampler's model {predicted:.3} {unit}, deviation {predicted_deviation:.3} {unit}"
+            "      best by the sampler's model, which averages over luck: mean {predicted:.3} {unit}, deviation {predicted_deviation:.3} {unit}"
         );
     }
     let other_gains = best.other_gains(configured);

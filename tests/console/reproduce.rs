@@ -150,7 +150,11 @@ fn the_texts_and_figures_of_the_checkout_are_those_of_its_results() {
         assert!(theirs == ours, "{file}: renew it with `quadfrog reproduce --from docs/reproduced.json --readme .`");
         assert!(!file.ends_with("svg") || ours.is_none_or(|svg| svg.len() < 60_000), "{file} is too large");
     }
-    assert!(fs::read_to_string(root().join("README.md")).unwrap().contains("| forward, 20 trials | 0.5 m |"));
+    assert!(
+        fs::read_to_string(root().join("README.md"))
+            .unwrap()
+            .contains("| forward, 20 trials, hardware-like simulation | 0.5 m |")
+    );
 }
 
 #[test]

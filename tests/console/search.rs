@@ -318,6 +318,27 @@ fn a_sampler_with_a_model_shows_its_mean_and_deviation() {
     assert_shows(&console.screen(80, 24), &["Model f0"]);
 }
 
+/// Regression: the first line, the chart and the answer at the end of a study gave the mean of the model as the value of a jump.
+#[test]
+fn the_best_by_a_model_is_shown_with_the_value_of_its_jump() {
+    let mut console = Console::proposed();
+    console.judged(4);
+    let mut insight = insight();
+    insight.predicted = vec![PredictedTrial { trial: 0, value: 0.437, deviation: 0.02 }];
+    insight.best = Some(0);
+    console.record(Record::Insight(insight));
+    let first = |screen: &str| screen.lines().next().unwrap().to_owned();
+    assert_shows(&first(&console.screen(200, 60)), &["best 0.400 m (#0 by the model)"]);
+    assert_shows(&first(&console.screen(80, 24)), &["best 0.400 m (#0)"]);
+    console.press(&["3"]);
+    assert_shows(&console.screen(120, 40), &["best 0.400 m #0 by the model"]);
+    console.stage(ExperimentStage::Finished, 3);
+    console.press(&["1"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["the best by the model is trial 0, J = 0.400 m", "its mean by the model 0.437"]);
+    assert_eq!(screen.matches("0.437").count(), 1, "{screen}");
+}
+
 #[test]
 fn the_signs_of_the_optimizer_are_explained_at_every_size() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {

@@ -95,8 +95,12 @@ fn repeats_are_one_point() {
     assert!((all[0].mean() - 4.0 / 3.0).abs() < 1e-15);
     assert!((all[0].deviation().unwrap() - (7.0_f64 / 3.0).sqrt()).abs() < 1e-12);
     assert_eq!(all[1].deviation(), None);
-    assert_eq!(contenders(&trials, Direction::Maximize, 1)[0].trials, [1]);
-    assert_eq!(contenders(&trials, Direction::Minimize, 1)[0].trials, [0, 2, 3]);
+    assert_eq!(contenders(&trials, Direction::Maximize, 1, None)[0].trials, [1]);
+    assert_eq!(contenders(&trials, Direction::Minimize, 1, None)[0].trials, [0, 2, 3]);
+    // The trial that a model calls the best is compared whatever its value.
+    let by_model = contenders(&trials, Direction::Maximize, 2, Some(3));
+    assert_eq!(by_model.iter().map(|point| point.trials[0]).collect::<Vec<_>>(), [0, 1]);
+    assert_eq!(contenders(&trials, Direction::Maximize, 1, Some(3))[0].trials, [0, 2, 3]);
 }
 
 #[test]

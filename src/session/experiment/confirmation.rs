@@ -38,10 +38,10 @@ impl BestConfirmation {
         BestConfirmation { contenders, confidence, concluded: None, reported: None, published: Vec::new() }
     }
 
-    /// Returns the first trials of the points that a confirmation in `study` would compare.
-    pub fn candidates(&self, study: &Study) -> Vec<u32> {
-        let best = contenders(study.trials(), study.options().direction, self.contenders as usize);
-        best.iter().filter(|point| point.without_fall > 0).map(|point| point.trials[0]).collect()
+    /// Returns the first trials of the points that a confirmation in `study` would compare, that of the trial `best` among them.
+    pub fn candidates(&self, study: &Study, best: Option<u32>) -> Vec<u32> {
+        let compared = contenders(study.trials(), study.options().direction, self.contenders as usize, best);
+        compared.iter().filter(|point| point.without_fall > 0).map(|point| point.trials[0]).collect()
     }
 
     /// Starts a confirmation of the points of `trials` with at most `repeats` repeats.
@@ -214,7 +214,7 @@ fn later_in_words(study: &Study, compared: &[RepeatedPoint], leader: usize) -> S
     let direction = study.options().direction;
     let last = compared.iter().flat_map(|point| &point.trials).max();
     let is_later = |point: &RepeatedPoint| point.without_fall > 0 && point.trials.first() > last;
-    let later = contenders(study.trials(), direction, usize::MAX).into_iter().find(is_later);
+    let later = contenders(study.trials(), direction, usize::MAX, None).into_iter().find(is_later);
     match later.filter(|point| direction.best_first(point.mean(), compared[leader].mean()).is_lt()) {
         Some(point) => {
             let better = if direction == Direction::Maximize { "higher" } else { "lower" };

@@ -218,7 +218,7 @@ impl Experiment {
             return Ok(Vec::new());
         }
         // In the study with the pending verdict: a refused request does not make the last verdict final.
-        let trials = self.confirmation.candidates(&self.study_with_verdict()?);
+        let trials = self.confirmation.candidates(&self.study_with_verdict()?, self.best().map(|best| best.trial));
         if trials.len() < 2 {
             return not_now("fewer than two points ended without a fall: nothing to compare");
         }

@@ -48,16 +48,16 @@ impl Trials {
         by_model.or_else(|| self.best_so_far().last())
     }
 
-    /// The best trial's number and its value: the mean that the sampler's model predicts, without one the trial's own.
-    pub fn best_value(&self) -> Option<(u32, f64)> {
+    /// The best trial's number, its value, and in words how both came about: ` by hand` after the value, ` by the model` after the
+    /// number. The value is that of the jump: what a model expects of its point is named as such where it is shown.
+    pub fn best_value(&self) -> Option<BestValue> {
         let best = self.best()?;
-        let by_model = self.model_best.filter(|model| model.trial == best.trial);
-        Some((best.trial, by_model.map(|model| model.value).or(best.value)?))
-    }
-
-    /// Whether the value of the best trial was measured by hand.
-    pub fn best_is_by_hand(&self) -> bool {
-        self.model_best.is_none() && self.best().is_some_and(|best| best.hand_value.is_some())
+        Some(BestValue {
+            trial: best.trial,
+            value: best.value?,
+            by_hand: if best.hand_value.is_some() { " by hand" } else { "" },
+            chosen: if self.model_best.is_some_and(|model| model.trial == best.trial) { " by the model" } else { "" },
+        })
     }
 
     /// The accepted trials that were better than all before them, in order.
@@ -79,7 +79,8 @@ impl Trials {
                 is_fall: row.verdict != Some(Verdict::Accept),
             })
         });
-        let best = contenders_of(points_of(results), Direction::Maximize, contenders);
+        let best =
+            contenders_of(points_of(results), Direction::Maximize, contenders, self.best().map(|best| best.trial));
         least_repeats(best.iter().filter(|point| point.without_fall > 0))
     }
 
@@ -90,6 +91,15 @@ impl Trials {
             |t: &&TrialRecord| t.parent.filter(|parent| *parent < t.trial).and_then(|parent| self.records.get(&parent));
         std::iter::successors(Some(trial), parent).count()
     }
+}
+
+/// The best trial in a line.
+#[derive(Debug, Clone, Copy)]
+pub struct BestValue {
+    pub trial: u32,
+    pub value: f64,
+    pub by_hand: &'static str,
+    pub chosen: &'static str,
 }
 
 /// Whether a trial ran and has that verdict.

@@ -13,7 +13,7 @@ use crate::legal::legal;
 use crate::message::Effect;
 use crate::model::dialog::{APPROVAL_TIME, Dialog, Question};
 use crate::model::log::LogLine;
-use crate::model::trials::RunTime;
+use crate::model::trials::{BestValue, RunTime};
 use crate::model::{Model, Notice};
 use crate::settings::BellCause;
 
@@ -128,9 +128,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
                     ExperimentStage::Running => lay_ground(model, info.trial),
                     ExperimentStage::Finished => {
                         let best = model.session.trials.best_value();
-                        let best = best.map_or("no trial was accepted".to_owned(), |(trial, value)| {
-                            let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
-                            format!("the best is trial {trial}, J = {value:.3} {}{by_hand}", model.session.info.unit)
+                        let best = best.map_or("no trial was accepted".to_owned(), |best| {
+                            let BestValue { trial, value, by_hand, chosen } = best;
+                            let unit = &model.session.info.unit;
+                            format!("the best{chosen} is trial {trial}, J = {value:.3} {unit}{by_hand}")
                         });
                         let confirmed = model.session.confirmation();
                         let best = confirmed.map_or(best.clone(), |confirmed| format!("{best}; {confirmed}"));

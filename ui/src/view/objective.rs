@@ -7,7 +7,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use super::draw::{cell_at, heading, heading_width, number, sign};
 use super::parameter_axes::LEAST_SPAN;
 use crate::model::session::SessionModel;
-use crate::model::trials::accepted_value;
+use crate::model::trials::{BestValue, accepted_value};
 use crate::theme::{Role, Theme};
 
 const SCALE: u16 = 6;
@@ -23,10 +23,8 @@ pub fn objective_over(what: &str, unit: &str) -> String {
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
     let best = session.trials.best();
     let aside = match session.trials.best_value() {
-        Some((trial, value)) => {
-            let model = if session.trials.model_best.is_some() { ", by the model" } else { "" };
-            let by_hand = if session.trials.best_is_by_hand() { " by hand" } else { "" };
-            format!("best {} {}{by_hand} #{trial}{model}", number(value), session.info.unit)
+        Some(BestValue { trial, value, by_hand, chosen }) => {
+            format!("best {} {}{by_hand} #{trial}{chosen}", number(value), session.info.unit)
         }
         None => "none accepted yet".to_owned(),
     };

@@ -12,6 +12,7 @@ use ratatui::widgets::Paragraph;
 use super::draw::{clock, clock_ms, number, span, truncate};
 use crate::action::Action;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, message_rows, tabs};
+use crate::model::trials::BestValue;
 use crate::model::{Model, View};
 use crate::theme::Role;
 
@@ -114,13 +115,13 @@ fn identity_in(model: &Model, words: Words) -> (Vec<Span<'static>>, Vec<usize>) 
             spans.push(Span::raw(part));
         }
     }
-    if let Some((best, value)) = model.session.trials.best_value() {
+    if let Some(BestValue { trial, value, by_hand, chosen }) = model.session.trials.best_value() {
         ends.push(spans.len());
         spans.push(Span::raw(if words == Words::Whole { "   best " } else { "  best " }));
-        let by_hand = if model.session.trials.best_is_by_hand() { " by hand" } else { "" };
         spans.push(span(theme, Role::Good, format!("{} {}{by_hand}", number(value), session.unit)));
         ends.push(spans.len());
-        spans.push(span(theme, Role::Quiet, format!(" (#{best})")));
+        let chosen = if words == Words::Whole { chosen } else { "" };
+        spans.push(span(theme, Role::Quiet, format!(" (#{trial}{chosen})")));
     }
     (spans, ends)
 }
