@@ -2,6 +2,7 @@
 
 use crate::support::{Console, assert_shows, line_with, proposal, tick, trial};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, RequestRecord, StageRecord, Transition};
+use quadfrog::recording::timeline::TrialRun;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Fault, Mode, Phase, TransitionCause};
 use quadfrog::trial::{
@@ -63,8 +64,7 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus::default()));
     let best = |console: &mut Console, best| {
-        let trials =
-            quadfrog::recording::timeline::TrialRun { trial: 7, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+        let trials = TrialRun { trial: 7, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
         let timeline = ReplayTimeline { trials: vec![trials], best, ..ReplayTimeline::default() };
         console.update(Msg::Timeline(Box::new(timeline)));
         console.press(&["G", "b", "e", "s", "t", "Enter"])
@@ -77,6 +77,20 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
     assert_shows(&console.screen(80, 24), &["the best is trial 3, which is not in this recording"]);
     console.press(&["Esc", "G"]);
     assert_shows(&console.screen(80, 24), &["best of the recording"]);
+}
+
+/// Regression: the timeline showed the suggested verdict of a trial as a given one.
+#[test]
+fn a_trial_that_waits_for_its_verdict_has_none_on_the_timeline() {
+    let mut console = Console::ready();
+    let row = TrialRecord { verdict: None, ..trial(7, None, Some(Verdict::Accept)) };
+    let run = TrialRun { trial: 7, begin_ns: 1_000_000_000, row_ns: 1, impulse_ns: None, end_ns: 8_000_000_000 };
+    console.update(Msg::Replay(ReplayStatus { duration_ns: 10_000_000_000, ..ReplayStatus::default() }));
+    let timeline = ReplayTimeline { trials: vec![run], rows: [(7, row)].into(), ..ReplayTimeline::default() };
+    console.update(Msg::Timeline(Box::new(timeline)));
+    let screen = console.screen(80, 24);
+    let line = screen.lines().rev().nth(2).unwrap();
+    assert!(line.contains('?') && !line.contains('o'), "{line}");
 }
 
 /// Two judged trials with signals, and trial 2 proposed.
@@ -291,8 +305,7 @@ fn the_details_of_a_replay_are_those_of_the_whole_recording() {
     console.stage(ExperimentStage::Running, 4);
     let judged = TrialRecord { cause: "landed and settled".into(), ..trial(4, Some(Verdict::Accept), None) };
     let later = trial(5, Some(Verdict::Fall), None);
-    let span =
-        quadfrog::recording::timeline::TrialRun { trial: 4, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+    let span = TrialRun { trial: 4, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
     let rows = [judged, later].into_iter().map(|row| (row.trial, row)).collect();
     let timeline = ReplayTimeline { trials: vec![span], rows, ..ReplayTimeline::default() };
     console.update(Msg::Timeline(Box::new(timeline)));

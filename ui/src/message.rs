@@ -318,11 +318,11 @@ impl ReplayTimeline {
 
     /// Whether a trial fell or tripped a limit, by its verdict or else its suggestion.
     pub fn fell(&self, trial: u32) -> bool {
-        self.verdict(trial) == Some(Verdict::Fall)
+        self.rows.get(&trial).and_then(|row| row.verdict.or(row.suggested)) == Some(Verdict::Fall)
     }
 
-    /// The verdict of a trial, or else its suggestion.
+    /// The verdict of a trial; none before it is judged.
     pub fn verdict(&self, trial: u32) -> Option<Verdict> {
-        self.rows.get(&trial).and_then(|row| row.verdict.or(row.suggested))
+        self.rows.get(&trial)?.verdict
     }
 }

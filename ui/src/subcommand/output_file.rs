@@ -36,14 +36,17 @@ pub fn write_file(
     }
 }
 
-/// Refuses a name that says another format; one that says none passes. `contents` names what is written: "a report is a page in HTML".
-pub fn require_format(file: &Path, extension: &str, contents: &str) -> Result<(), Failure> {
+/// Refuses a name that says another format than that of the first of `extensions`; one that says none passes. `contents` names what is written: "a report is a page in HTML".
+pub fn require_format(file: &Path, extensions: &[&str], contents: &str) -> Result<(), Failure> {
     match file.extension() {
-        Some(other) if !has_extension(file, extension) => Err(Failure::input(format!(
-            "--output {}: {contents}, not .{}; end its name in .{extension}",
-            file.display(),
-            other.to_string_lossy()
-        ))),
+        Some(other) if !extensions.iter().any(|extension| has_extension(file, extension)) => {
+            Err(Failure::input(format!(
+                "--output {}: {contents}, not .{}; end its name in .{}",
+                file.display(),
+                other.to_string_lossy(),
+                extensions[0]
+            )))
+        }
         _ => Ok(()),
     }
 }

@@ -29,7 +29,7 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
     };
     let recovered = recovered.map_err(failure)?;
     put_line!(
-        "{}: {}, {}",
+        "Recovered {}: {}, {}",
         recovered.path.display(),
         counted(recovered.ticks as usize, "tick"),
         counted(recovered.messages as usize, "message")

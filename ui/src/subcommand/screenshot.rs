@@ -91,7 +91,7 @@ fn parse_size(text: &str) -> Result<(u16, u16), String> {
 /// Plays the recording up to the moment without a terminal, presses the keys and draws the screen.
 pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
-        require_format(path, EXTENSION, "a screenshot is a picture in SVG")?;
+        require_format(path, &[EXTENSION], "a screenshot is a picture in SVG")?;
     }
     let config = arguments::load_config(arguments.config.as_deref())?;
     let mut recording = Timeline::open(&recordings_of(&arguments.file)?)?;

@@ -14,7 +14,7 @@ use crate::subcommand::output_file::{require_format, write_whole};
 /// # Errors
 /// When the name is not that of a page, the file is something else, its folder does not exist, or it cannot be written.
 pub fn write_page(file: &Path, text: &str) -> Result<(), Failure> {
-    require_format(file, "html", "a report is a page in HTML")?;
+    require_format(file, &["html", "htm"], "a report is a page in HTML")?;
     check(file, "--output", html::is_report)?;
     write(file, text)
 }
