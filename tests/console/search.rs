@@ -337,6 +337,8 @@ fn the_best_by_a_model_is_shown_with_the_value_of_its_jump() {
     let screen = console.screen(120, 40);
     assert_shows(&screen, &["the best by the model is trial 0, J = 0.400 m", "its mean by the model 0.437"]);
     assert_eq!(screen.matches("0.437").count(), 1, "{screen}");
+    console.press(&["2", "Home", "Enter"]);
+    assert_shows(&console.screen(120, 40), &["by the sampler's model: mean 0.437 ±0.020 m"]);
 }
 
 #[test]

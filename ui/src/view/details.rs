@@ -5,7 +5,7 @@ use quadfrog::trial::{
     Displacement, ExpectedResult, JudgedBy, JumpRow, Overrides, TrialRecord, four_digits, six_digits,
 };
 
-use super::draw::{clock, falls_near};
+use super::draw::{clock, falls_near, with_deviation};
 use super::points;
 use crate::model::session::SessionModel;
 use crate::theme::Theme;
@@ -60,6 +60,10 @@ pub fn details(
     }
     if let Some(value) = session.measured_objective(trial) {
         row("measured", format!("{value:.4} {unit}"));
+    }
+    if let Some(model) = session.trials.model_best.filter(|model| model.trial == trial.trial) {
+        let mean = with_deviation(theme, model.value, model.deviation, unit);
+        row("best", format!("by the sampler's model: mean {mean}; a higher jump of another trial may be luck"));
     }
     row("source", trial.origin());
     row("attempt", session.trials.attempt(trial).to_string());
