@@ -1,5 +1,6 @@
 //! Results of the experiments, as in `results.json`: everything from which report, figures and tables are made.
 
+use std::io::Write as _;
 use std::path::Path;
 
 use quadfrog::optimize::ask::SamplerKind;
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::configuration::ExperimentConfiguration;
 use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, RunJob, RunPoint, StudyJob};
+use crate::subcommand::output_file::write_whole;
 
 /// All results, in the order of the jobs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -149,9 +151,8 @@ impl ReproduceResults {
     /// # Errors
     /// When it cannot be written; a file of that name then has its old contents.
     pub fn write(&self, file: &Path) -> std::io::Result<()> {
-        let unfinished = file.with_extension("json.part");
-        std::fs::write(&unfinished, serde_json::to_string(self)? + "\n")?;
-        std::fs::rename(unfinished, file)
+        let text = serde_json::to_string(self)? + "\n";
+        write_whole(file, |to| to.write_all(text.as_bytes()))
     }
 
     /// Marks `experiments` as complete, orders studies and runs as `jobs`, and drops all others.
