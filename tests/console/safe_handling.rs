@@ -192,6 +192,8 @@ fn a_recording_is_recovered_into_the_file_that_is_given() {
     let printed = program.text(&["recover", "cut.mcap.part", "--output", "found.mcap"]);
     assert_shows(&printed, &["found.mcap", "ticks", "The recording is not complete: ", "cut.mcap.part is unchanged"]);
     assert!(!program.path("cut.mcap").exists());
+    let other = program.refused(&["recover", "cut.mcap"]);
+    assert_shows(&other, &["cut.mcap: there is no such file", "give cut.mcap.part"]);
     assert_eq!(Player::open(program.path("found.mcap")).unwrap().damage(), None);
     // Nothing is overwritten, the name says what the file is, and a lock without a session does not count.
     assert!(program.refused(&["recover", "cut.mcap.part", "--output", "found.mcap"]).contains("exists already"));

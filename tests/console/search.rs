@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::support::{Console, assert_shows, line_with, proposal, requests, session, tick, trial};
 use quadfrog::config::Config;
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::WaitedFor;
 use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits, Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
@@ -14,7 +15,8 @@ use quadfrog::session::storage::StorageWait;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{
     Backend, ExperimentStage, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, Proposal, ProposalInsight,
-    ProposalSource, ProposedParameter, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
+    ProposalSource, ProposedParameter, SearchStatus, SearchedParameter, SimulatorComparison, Task, TrialRecord,
+    Verdict,
 };
 use quadfrog_console::export;
 use quadfrog_console::message::{Effect, ExportedRows, Msg};
@@ -316,6 +318,30 @@ fn a_sampler_with_a_model_shows_its_mean_and_deviation() {
     let mean = rows.iter().position(|line| line.chars().take(66).any(|c| c == '*')).expect("the mean");
     assert!(rows[mean - 1].contains('│') && rows[mean + 1].contains('│'), "{wide}");
     assert_shows(&console.screen(80, 24), &["Model f0"]);
+}
+
+/// Regression: the panels of a study with another sampler were titled TPE before its first proposal, and those of `sim` explained an
+/// importance that is not shown beside the simulated robots.
+#[test]
+fn the_optimizer_names_the_sampler_before_its_first_proposal() {
+    for (kind, title) in [(SamplerKind::Sim, "sim f0 "), (SamplerKind::Gp, "gp f0 "), (SamplerKind::Tpe, "TPE f0 ")] {
+        let mut console = Console::new();
+        console.record(Record::Session(SessionInfo { sampler: Some(kind), ..session() }));
+        console.press(&["3"]);
+        let screen = console.screen(120, 40);
+        assert_shows(&screen, &[title, "no proposal yet"]);
+        assert_eq!(screen.contains("TPE"), kind == SamplerKind::Tpe, "{screen}");
+    }
+    let mut console = Console::proposed();
+    let simulator =
+        Some(SimulatorComparison { ratio: 1.085, ratio_deviation: 0.202, ..SimulatorComparison::default() });
+    console.record(Record::Insight(ProposalInsight { simulator, ..insight() }));
+    console.press(&["3"]);
+    assert!(!console.screen(120, 40).contains("importance"), "{}", console.screen(120, 40));
+    assert_shows(
+        &console.screen(80, 24),
+        &["the robot shows 1.085 ±0.202 times the simulated change over the parameters"],
+    );
 }
 
 /// Regression: the first line, the chart and the answer at the end of a study gave the mean of the model as the value of a jump.

@@ -349,6 +349,25 @@ fn without_worthwhile_gain_the_highest_of_the_sure_points_is_jumped() {
     assert!(lowest_share > 0.8, "{lowest_share}");
 }
 
+/// Regression: where no gain is worth its risk, a void trial closed a third of the range about the best point for the rest of a study.
+#[test]
+fn a_void_trial_does_not_drive_the_search_from_the_best_region() {
+    let mut share = f64::INFINITY;
+    for seed in 0..5 {
+        for before in [6, 9] {
+            let mut study = right(seed);
+            let best = (0..before).filter_map(|_| jump(&mut study, &ROBOT)).fold(0.0, f64::max);
+            let void = study.begin(&study.draft(), &[], &[]).unwrap();
+            study.tell(void, Outcome::Fail).unwrap();
+            let after: Vec<f64> = (0..6).filter_map(|_| jump(&mut study, &ROBOT)).collect();
+            let mean = after.iter().sum::<f64>() / after.len() as f64;
+            println!("seed {seed}, void {before}: best {best:.3}, mean of the six later ones {mean:.3}");
+            share = share.min(mean / best);
+        }
+    }
+    assert!(share > 0.95, "{share}");
+}
+
 #[test]
 fn void_and_running_trials_are_not_proposed_again() {
     let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();

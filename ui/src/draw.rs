@@ -14,6 +14,7 @@ use ratatui::text::{Line, Span};
 
 use crate::model::Model;
 use crate::theme::{Role, Theme};
+use crate::wrap::unbroken;
 
 pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
     Span::styled(text.into(), theme.style(role))
@@ -61,7 +62,7 @@ pub fn with_deviation(theme: &Theme, value: f64, deviation: f64, unit: &str) -> 
 /// Expectation of the sampler's model of a trial: `expected 0.612 ±0.031 m, stands with 93 %`.
 pub fn expectation(theme: &Theme, expected: &ExpectedResult, unit: &str) -> String {
     let value = with_deviation(theme, expected.value, expected.deviation, unit);
-    format!("expected {value}, stands with {:.0} %", 100.0 * expected.p_stand)
+    format!("expected {value}, {}", unbroken(&format!("stands with {:.0} %", 100.0 * expected.p_stand)))
 }
 
 /// Hours, minutes and seconds of a time in ns; hours only where there are any.

@@ -141,7 +141,8 @@ impl<'a> Acquisition<'a> {
 
     /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not
     /// worth their risk the one of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that
-    /// stands makes points beyond it sure. Of the others the surest is the best. Near void points the merit is reduced.
+    /// stands makes points beyond it sure. It is counted from the incumbent: near void points the merit is reduced, and of a merit
+    /// counted from 0 a hundredth would be more than there is to gain. Of the others the surest is the best.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
         let prediction = self.predict(x, features);
         let PointPrediction { mean, variance, p_stand } = prediction;
@@ -154,11 +155,13 @@ impl<'a> Acquisition<'a> {
         let (reason, merit) = if utility > 0.0 && p_stand >= self.least {
             (Reason::Gain, utility)
         } else if 1.0 - p_stand <= SURE * (1.0 - self.least) {
-            (Reason::Sure, (mean + deviation - self.origin).max(0.0))
+            (Reason::Sure, mean + deviation - self.incumbent.unwrap_or(self.origin))
         } else {
             (Reason::Unsure, p_stand)
         };
-        let score = Score { reason, merit: merit * self.away_from_void(x) };
+        let away = self.away_from_void(x);
+        let score =
+            Score { reason, merit: if merit > 0.0 { merit * away } else { merit / away.max(f64::MIN_POSITIVE) } };
         Scored { point: x.to_vec(), score, prediction }
     }
 

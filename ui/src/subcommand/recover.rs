@@ -23,6 +23,12 @@ pub struct RecoverArguments {
 pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
     let RecoverArguments { file, output } = arguments;
     refuse_running(arguments)?;
+    let part = file.with_extension("mcap.part");
+    if !file.exists() && part.exists() {
+        let text =
+            format!("{}: there is no such file; give {}, which was not finished", file.display(), part.display());
+        return Err(Failure::input(text));
+    }
     let recovered = match output {
         Some(output) => recover::recover_to(file, output),
         None => recover::recover(file),

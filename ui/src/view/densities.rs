@@ -2,6 +2,7 @@
 //! first is high and the second is low. A sampler with a model of the objective: its mean and standard deviation at the
 //! points of the finished trials.
 
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::trial::{ParameterInfo, ParameterInsight, ProposalInsight};
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
@@ -21,7 +22,8 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
     let importance = parameter.and_then(|parameter| parameter.importance);
     let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
-    let body = heading(frame, area, theme, &title(insight, modelled, &info.name, area.width), &aside);
+    let body =
+        heading(frame, area, theme, &title(insight, modelled, session.info.sampler, &info.name, area.width), &aside);
     let drawn = match insight {
         Some(insight) if modelled => render_prediction(frame, body, session, insight, info, theme),
         _ => parameter.is_some_and(|parameter| render_densities(frame, body, session, parameter, info, theme)),
@@ -38,12 +40,20 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
 }
 
 /// The longest title for which there is room.
-fn title(insight: Option<&ProposalInsight>, modelled: bool, name: &str, width: u16) -> String {
+fn title(
+    insight: Option<&ProposalInsight>,
+    modelled: bool,
+    sampler: Option<SamplerKind>,
+    name: &str,
+    width: u16,
+) -> String {
     let trial = insight.map(|insight| insight.trial);
+    let is_tpe = sampler.is_none_or(|kind| kind == SamplerKind::Tpe);
+    let of = if is_tpe { "TPE" } else { sampler.map_or("", SamplerKind::name) };
     match (trial, modelled, width) {
-        (Some(trial), false, 58..) => format!("TPE densities of {name} (#{trial})"),
-        (Some(trial), false, 36..) => format!("TPE {name} (#{trial})"),
-        (_, false, _) => format!("TPE {name}"),
+        (Some(trial), false, 58..) if is_tpe => format!("TPE densities of {name} (#{trial})"),
+        (Some(trial), false, 36..) => format!("{of} {name} (#{trial})"),
+        (_, false, _) => format!("{of} {name}"),
         (Some(trial), true, 58..) => format!("Predicted J over {name} (#{trial}): mean and deviation"),
         (_, true, 36..) => format!("Predicted J over {name}"),
         (_, true, _) => format!("Model {name}"),

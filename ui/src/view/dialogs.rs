@@ -182,7 +182,11 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
     let mut lines = Vec::new();
     for (index, row) in form.rows.iter().enumerate() {
         if row.gain && !form.rows[index.saturating_sub(1)].gain {
-            lines.push(Line::from(span(theme, Role::Quiet, "  gains of the controller, for this trial alone")));
+            lines.push(Line::from(span(
+                theme,
+                Role::Quiet,
+                "  gains of the controller, for this trial alone; its J counts",
+            )));
         }
         let selected = index == form.selected;
         let symbol = if selected { ">" } else { " " };

@@ -1,6 +1,6 @@
 //! View 3, Optimizer: objective over trials and parameters, the sampler's reasons, landing places.
 
-use quadfrog::trial::{ParameterInfo, SimulatorComparison, Verdict};
+use quadfrog::trial::{ParameterInfo, ProposalInsight, SimulatorComparison, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -59,7 +59,7 @@ fn render_simulator(frame: &mut Frame, area: Rect, simulator: &SimulatorComparis
     let SimulatorComparison { ratio, ratio_deviation, bias, bias_deviation, worlds, contradicted } = simulator;
     let mut lines = vec![
         Line::from(format!(
-            " the robot shows {} the change over the parameters that is simulated",
+            " the robot shows {} the simulated change over the parameters",
             with_deviation(theme, *ratio, *ratio_deviation, "times")
         )),
         Line::from(format!(" and differs everywhere by {}", with_deviation(theme, *bias, *bias_deviation, unit))),
@@ -137,7 +137,8 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
         items.extend([("g", Role::Good, "good"), ("r", Role::SeriesB, "rest")]);
     }
     items.push((theme.line(), Role::Quiet, "best so far"));
-    if session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| p.importance.is_some())) {
+    let important = |insight: &ProposalInsight| insight.parameters.iter().any(|p| p.importance.is_some());
+    if session.simulator().is_none() && session.insight.as_ref().is_some_and(important) {
         items.push(("importance:", Role::Quiet, "for best tenth"));
     }
     let mut spans = vec![Span::raw(" ")];

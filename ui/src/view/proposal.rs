@@ -148,7 +148,9 @@ fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResu
         lines.push(Line::from(span(theme, Role::Quiet, text)));
     }
     if expected.advises_to_stop {
-        let text = " no point is worth its risk of a fall: end the search and confirm the best".to_owned();
+        let text =
+            " no gain is worth the risk of a fall: confirm the best, or go on with sure points, which may show more"
+                .to_owned();
         lines.push(Line::from(span(theme, Role::Warning, text)));
     }
     lines
