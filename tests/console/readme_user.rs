@@ -93,6 +93,36 @@ fn a_trial_that_waits_for_its_verdict_has_none_on_the_timeline() {
     assert!(line.contains('?') && !line.contains('o'), "{line}");
 }
 
+/// Regression: frozen charts of a replay stayed beside every other place, and counted seconds of the clock on the wall.
+#[test]
+fn frozen_charts_of_a_replay_end_where_the_playhead_goes_elsewhere() {
+    let at = |ms: u64| tick(ms, 0.1, None);
+    for key in ["i", "[", ")", "p"] {
+        let mut console = Console::ready();
+        console.update(Msg::Replay(ReplayStatus { duration_ns: 10_000_000_000, ..ReplayStatus::default() }));
+        (0..2000).step_by(5).for_each(|ms| console.tick(at(ms)));
+        console.press(&["Left"]);
+        console.wait(3000);
+        assert_shows(&console.screen(120, 40), &["VIEW FROZEN -0.0 s"]);
+        console.tick(at(2500));
+        assert_shows(&console.screen(120, 40), &["VIEW FROZEN -0.5 s"]);
+        console.press(&[key]);
+        assert!(!console.screen(120, 40).contains("FROZEN"), "{key}: {}", console.screen(120, 40));
+    }
+}
+
+/// Regression: a number without a mark went to that second without a word, and was meant as a trial.
+#[test]
+fn a_bare_number_says_what_it_was_taken_for() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus { duration_ns: 20_000_000_000, ..ReplayStatus::default() }));
+    let run = TrialRun { trial: 12, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+    console.update(Msg::Timeline(Box::new(ReplayTimeline { trials: vec![run], ..ReplayTimeline::default() })));
+    let effects = console.press(&["G", "1", "2", "Enter"]);
+    assert_eq!(effects, [Effect::Replay(ReplayCommand::Time(12_000_000_000))]);
+    assert_eq!(console.said(), "12 s after the beginning; trial 12 is #12");
+}
+
 /// Two judged trials with signals, and trial 2 proposed.
 fn with_two_jumps() -> Console {
     let mut console = Console::ready();

@@ -175,6 +175,22 @@ pub enum ReplayCommand {
     Lay(u32),
 }
 
+impl ReplayCommand {
+    /// Whether the playhead goes to another place, or on from where it is `playing` already or not.
+    pub fn leaves_the_place(self, playing: bool) -> bool {
+        match self {
+            ReplayCommand::PlayPause => !playing,
+            ReplayCommand::Slower
+            | ReplayCommand::Faster
+            | ReplayCommand::SlowMotion
+            | ReplayCommand::Beside(_)
+            | ReplayCommand::EndBeside
+            | ReplayCommand::Lay(_) => false,
+            _ => true,
+        }
+    }
+}
+
 /// Length of a single step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplayStep {

@@ -3,8 +3,9 @@
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    Approval, ExperimentStage, ObjectiveRule, Overrides, ParameterInfo, PointRecord, Proposal, ProposalInsight,
-    ProposedParameter, QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord, Verdict,
+    Approval, ExperimentStage, ObjectiveRule, Overrides, ParameterInfo, ParameterInsight, PointRecord, Proposal,
+    ProposalInsight, ProposedParameter, QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord,
+    Verdict,
 };
 
 use super::log::SessionLog;
@@ -80,9 +81,15 @@ impl SessionModel {
         self.proposal.as_ref().filter(|proposal| proposal.trial == trial)
     }
 
-    /// The value that the operator gave a parameter of the open proposal.
-    pub fn override_of(&self, parameter: &str) -> Option<f64> {
-        self.open_proposal()?.changed().find(|changed| changed.name == parameter).map(|changed| changed.value)
+    /// The value with which the trial of the sampler's reasons runs or ran in place of the one that the sampler has proposed.
+    pub fn override_of(&self, sampled: &ParameterInsight) -> Option<f64> {
+        let trial = self.insight.as_ref()?.trial;
+        let open = self.open_proposal().filter(|proposal| proposal.trial == trial);
+        let value = match open {
+            Some(proposal) => proposal.parameters.iter().find(|p| p.name == sampled.name)?.value,
+            None => self.trials.records.get(&trial)?.parameters.get(&sampled.name)?,
+        };
+        Some(value).filter(|value| *value != sampled.proposed)
     }
 
     /// The open proposal, or that of the running trial.

@@ -36,6 +36,11 @@ pub use request::{reply, say};
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let was_open = model.dialog.is_some();
     let effects = fold(model, msg);
+    let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
+    // Frozen charts beside another place of the recording would be taken for those of that place.
+    if effects.iter().any(|effect| matches!(effect, Effect::Replay(command) if command.leaves_the_place(playing))) {
+        model.live.frozen = None;
+    }
     if model.dialog.is_some() && !was_open {
         model.dialog_opened_at = model.clock;
     }

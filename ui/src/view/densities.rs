@@ -107,7 +107,7 @@ fn draw_proposed(
     sampled: &ParameterInsight,
     theme: &Theme,
 ) {
-    let overridden = session.override_of(&sampled.name);
+    let overridden = session.override_of(sampled);
     if overridden.is_some() {
         axes.draw_line(buffer, sampled.proposed, theme, Role::Quiet);
     }

@@ -130,7 +130,9 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
         (false, false, false) => None,
     };
     items.extend(line.map(|(role, text)| (theme.bar(), role, text)));
-    if reasons && session.open_proposal().is_some_and(|proposal| proposal.changed().next().is_some()) {
+    let overridden =
+        |insight: &ProposalInsight| insight.parameters.iter().any(|sampled| session.override_of(sampled).is_some());
+    if reasons && session.insight.as_ref().is_some_and(overridden) {
         items.push((theme.bar(), Role::Quiet, "of the sampler"));
     }
     if densities && !modelled {

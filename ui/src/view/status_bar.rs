@@ -281,8 +281,12 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
         span(theme, Role::Quiet, " actions "),
     ];
     let mut aside = match (&model.live.frozen, landed) {
-        (Some((_, at)), _) => {
-            let ago_s = model.clock.saturating_sub(*at).as_secs_f64();
+        (Some((history, at)), _) => {
+            let ago_s = match model.replay {
+                // Recorded time.
+                Some(_) => model.history.newest_ns().saturating_sub(history.newest_ns()) as f64 / 1e9,
+                None => model.clock.saturating_sub(*at).as_secs_f64(),
+            };
             let view = if narrow { "" } else { "VIEW " };
             vec![
                 span(theme, Role::Hardware, format!(" {view}FROZEN -{ago_s:.1} s ")),

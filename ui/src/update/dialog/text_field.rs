@@ -1,6 +1,7 @@
 //! Keys of the one-line text fields, and the effect of their text.
 
 use crossterm::event::KeyCode;
+use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::trial::{TrialRecord, six_digits};
 use tui_input::{Input, InputRequest};
@@ -15,7 +16,7 @@ use crate::model::dialog::{
 };
 use crate::update::beside::chosen;
 use crate::update::rejudged;
-use crate::update::request::{cancelled, request};
+use crate::update::request::{cancelled, reply, request};
 
 /// Share of the robot's measurement, and distance from it in m or rad, beyond which a value measured by hand is asked about: more
 /// than the estimator drifts in a jump, less than a lost or a shifted decimal point.
@@ -136,7 +137,16 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
             model.trial_table.selected = Some(number);
             return Ok(Vec::new());
         }
-        Purpose::Seek => return seek(model, text).map(|command| vec![Effect::Replay(command)]),
+        Purpose::Seek => {
+            let command = seek(model, text)?;
+            // Second 12, or trial 12?
+            let trial =
+                text.parse().ok().filter(|trial| model.timeline.as_ref().is_some_and(|t| t.has_ticks_of(*trial)));
+            if let Some(trial) = trial {
+                reply(model, LogLevel::Info, format!("{trial} s after the beginning; trial {trial} is #{trial}"));
+            }
+            return Ok(vec![Effect::Replay(command)]);
+        }
         Purpose::Rejudge => return Ok(rejudged::chosen(model, text)),
         Purpose::Beside => {
             let number = text.strip_prefix('#').unwrap_or(text).trim();
