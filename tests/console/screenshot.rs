@@ -129,6 +129,8 @@ fn wrong_input_is_refused_with_the_remedy() {
     assert_shows(&refused(&["--size", "9999x9999"]), &["to 400x200"]);
     assert_shows(&refused(&["--keys", "2 Entr"]), &["`Entr` is no key"]);
     assert_shows(&refused(&["--time=-1"]), &["not a time in s"]);
+    // Regression: a time after the end drew the end without a word.
+    assert_shows(&refused(&["--time", "9999"]), &["--time 9999", "after the end of ", "forward", "2.256 s"]);
 }
 
 #[test]

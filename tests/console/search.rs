@@ -387,6 +387,20 @@ fn the_signs_of_the_optimizer_are_explained_at_every_size() {
     }
 }
 
+/// Regression: the title explained a star that no line had.
+#[test]
+fn a_star_is_explained_where_the_best_was_repeated() {
+    for (trials, mean, starred) in [(vec![0, 3], 0.3, false), (vec![2, 3], 0.61, true)] {
+        let mut console = finished();
+        let point = PointRecord { trials, without_fall: 2, mean, ..PointRecord::default() };
+        console.record(Record::Points(vec![point]));
+        let screen = console.screen(120, 40);
+        assert_shows(&screen, &["repeated points"]);
+        assert_eq!(screen.contains("*: that of the best"), starred, "{screen}");
+        assert_eq!(screen.contains("* best 0.610 m (#2)"), starred, "{screen}");
+    }
+}
+
 /// A finished study of four trials; trial 2 is the best.
 fn finished() -> Console {
     let mut console = Console::ready();

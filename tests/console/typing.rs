@@ -295,6 +295,10 @@ fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_char
     assert_eq!(console.requests(&["Down", "x", "Enter"]), []);
     assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again confirms 250"]);
     assert_eq!(console.requests(&["Enter"]), overridden(12.0));
+    // Regression: the question promised to use a number that is outside its bounds.
+    assert_eq!(console.requests(&["o", "1", "O", "5", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["f0 = 15 Hz is outside 0.75 to 1.75 Hz"]);
+    console.press(&["Esc", "Esc"]);
     // A number that is typed anew has no missing character.
     assert_eq!(console.requests(&["o", "Down", "7", "O", "Backspace", "8", "Enter"]), overridden(8.0));
 }

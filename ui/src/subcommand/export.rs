@@ -60,7 +60,7 @@ pub struct ExportArguments {
     /// Export the ticks of one trial
     #[arg(long, value_name = "N", conflicts_with = "time", value_parser = whole_number(0_u32..=u32::MAX), add = ArgValueCandidates::new(completion::trials))]
     trial: Option<u32>,
-    /// Export the ticks from time A to before time B, s since the session began; both may be left out, as in 12.5..
+    /// Export the ticks from time A to before time B, s since the session of the file began (a replay of a folder counts on over its sessions); both may be left out, as in 12.5..
     #[arg(long, value_name = "A..B", value_parser = parse_times)]
     time: Option<(u64, u64)>,
     /// Export the signals of one topic [default: all]

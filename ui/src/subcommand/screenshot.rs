@@ -98,7 +98,12 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
-        (None, time) => time.unwrap_or(u64::MAX).min(recording.duration_ns()),
+        (None, Some(time)) if time > recording.duration_ns() => {
+            let (at_s, end_s) = (time as f64 / 1e9, recording.duration_ns() as f64 / 1e9);
+            let text = format!("--time {at_s}: after the end of {}, {end_s:.3} s", arguments.file.display());
+            return Err(Failure::input(text));
+        }
+        (None, time) => time.unwrap_or(recording.duration_ns()),
     };
     let settings = ConsoleSettings { theme: arguments.theme, ..settings(&config)? };
     let theme = Theme::new(Colours::True, Glyphs::Braille);

@@ -31,7 +31,8 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     objective::render(frame, history, session, theme);
     render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
-        let body = heading(frame, repeats, theme, "Repeated points", "landed/repeats, mean, std; *: that of the best");
+        let aside = format!("landed/repeats, mean, std{}", points::star(session));
+        let body = heading(frame, repeats, theme, "Repeated points", &aside);
         let lines = points::within(repeated, theme, 0, usize::from(body.height));
         frame.render_widget(Paragraph::new(lines), body);
     }

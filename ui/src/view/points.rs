@@ -29,7 +29,7 @@ pub fn titled_lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<
         return lines;
     }
     let title = match width >= WORDS_FROM {
-        true => " repeated points; *: that of the best".to_owned(),
+        true => format!(" repeated points{}", star(session)),
         false => {
             // Without a confidence the line of the leading point says it.
             let leads = if session.trials.points.iter().any(|point| point.confidence.is_some()) { "leads" } else { "" };
@@ -58,10 +58,20 @@ pub fn within(lines: Vec<Line<'static>>, theme: &Theme, titles: usize, rows: usi
     lines.into_iter().take(kept).chain([Line::from(span(theme, Role::Quiet, sign))]).take(rows).collect()
 }
 
+/// Whether the best trial is one of the point.
+fn has_best(session: &SessionModel, point: &PointRecord) -> bool {
+    session.trials.best().is_some_and(|best| point.trials.contains(&best.trial))
+}
+
+/// The explanation of the star, where a point has it.
+pub fn star(session: &SessionModel) -> &'static str {
+    let starred = session.trials.points.iter().any(|point| has_best(session, point));
+    if starred { "; *: that of the best" } else { "" }
+}
+
 /// The number of a point's first trial; `*` before that of the best.
 fn first_trial(session: &SessionModel, point: &PointRecord) -> String {
-    let has_best = session.trials.best().is_some_and(|best| point.trials.contains(&best.trial));
-    format!("{}#{}", if has_best { "*" } else { " " }, point.trials.first().copied().unwrap_or(0))
+    format!("{}#{}", if has_best(session, point) { "*" } else { " " }, point.trials.first().copied().unwrap_or(0))
 }
 
 /// A line below the names of its numbers.

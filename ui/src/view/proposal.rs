@@ -219,7 +219,7 @@ fn finished(model: &Model, width: usize) -> PanelText {
     let value = best.value.map(number).unwrap_or_default();
     let repeated = points::titled_lines(session, theme, width);
     let mut lines = vec![Line::from(vec![
-        span(theme, Role::Quiet, if repeated.is_empty() { " best " } else { "* best " }),
+        span(theme, Role::Quiet, if points::star(session).is_empty() { " best " } else { "* best " }),
         span(theme, Role::Good, format!("{value} {}", session.info.unit)),
         span(theme, Role::Quiet, format!(" (#{}{})", best.trial, if best.counts_by_hand() { ", by hand" } else { "" })),
     ])];

@@ -36,7 +36,7 @@ impl OverrideForm {
     /// Reports, before a key uses the number, that a character of it was not taken; the key uses it when pressed again, and a digit
     /// begins the number anew.
     fn asks_about_refused_character(&mut self, key: Key, does: &str) -> bool {
-        if !self.problem.as_deref().is_some_and(is_refused_character) {
+        if !self.problem.as_deref().is_some_and(is_refused_character) || self.is_outside() {
             return false;
         }
         let shown = self.rows.get(self.selected).map(|row| six_digits(row.value)).unwrap_or_default();
@@ -44,6 +44,12 @@ impl OverrideForm {
         self.problem = Some(acknowledges_refused_character(&format!("{key} again {does} {number}")));
         self.replaces = true;
         true
+    }
+
+    /// Whether the typed number is outside its bounds: it is refused for that, in place of a question that promises to use it.
+    fn is_outside(&self) -> bool {
+        let typed = self.typing.as_ref().and_then(|input| input.value().trim().replace(',', ".").parse::<f64>().ok());
+        typed.zip(self.rows.get(self.selected)).is_some_and(|(value, row)| !(row.low..=row.high).contains(&value))
     }
 
     /// Takes the typed value over; false if it is refused, with the reason in `problem`.
