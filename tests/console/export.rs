@@ -138,6 +138,12 @@ fn no_file_of_another_kind_is_replaced() {
         assert_shows(&program.refused(&["report", folder, "--output", file]), &[file, "HTML", ".html"]);
     }
     assert!(!program.path("new.png").exists());
+    // Regression: a folder that does not exist was an error of the system, without the way out.
+    fs::create_dir(program.path("folder")).unwrap();
+    for (place, what) in [("nowhere/x.csv", "the folder nowhere does not exist"), ("folder", "it is a folder")] {
+        let refused = program.refused(&["study", "export", folder, "--format", "csv", "-o", place]);
+        assert_shows(&refused, &["--output", place, what]);
+    }
     // What the same command wrote is replaced.
     for _ in 0..2 {
         program.text(&["study", "export", folder, "-o", "trials.csv"]);

@@ -12,18 +12,17 @@ use super::failure::Failure;
 /// links, ends in `.extension`: a journal, a recording or a script is none of the tables and pictures that commands write.
 ///
 /// # Errors
-/// When a file of another kind exists, before anything is written; when it cannot be written, with the cause.
+/// As of [`require_place`], or when a file of another kind exists, before anything is written; when it cannot be written, with the
+/// cause.
 pub fn write_file(
     file: &Path,
     extension: &str,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Failure> {
+    require_place("--output", file)?;
     // What does not exist, or leads nowhere, is written as it is named.
     let place = fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
     match fs::metadata(&place) {
-        Ok(about) if about.is_dir() => {
-            Err(Failure::input(format!("--output {}: it is a folder; give the name of a file in it", file.display())))
-        }
         Ok(about) if !about.is_file() => {
             let opened = OpenOptions::new().write(true).open(&place);
             opened.and_then(|opened| whole(opened, write)).map(drop).map_err(|error| not_written(file, &error))
@@ -34,6 +33,19 @@ pub fn write_file(
         ))),
         _ => write_whole(&place, write).map_err(|error| not_written(file, &error)),
     }
+}
+
+/// Refuses a folder, and a file in a folder that does not exist. `option` is the argument that names it.
+pub fn require_place(option: &str, file: &Path) -> Result<(), Failure> {
+    let refuse = |what: &str| Err(Failure::input(format!("{option} {}: {what}", file.display())));
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        return refuse(&format!("the folder {} does not exist; make it first", folder.display()));
+    }
+    if file.is_dir() || file.file_name().is_none() {
+        return refuse("it is a folder; give the name of a file in it");
+    }
+    Ok(())
 }
 
 /// Refuses a name that says another format than that of the first of `extensions`; one that says none passes. `contents` names what is written: "a report is a page in HTML".

@@ -7,7 +7,7 @@ use anyhow::Context;
 use quadfrog::report::{html, svg};
 
 use crate::subcommand::failure::Failure;
-use crate::subcommand::output_file::{require_format, write_whole};
+use crate::subcommand::output_file::{require_format, require_place, write_whole};
 
 /// Writes a page; an existing file is replaced only if it is a report.
 ///
@@ -45,14 +45,8 @@ pub fn write_figures<'a>(
 }
 
 fn check(file: &Path, option: &str, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
-    let refuse = |what: &str| Err(Failure::input(format!("{option}: {}: {what}", file.display())));
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        return refuse(&format!("the folder {} does not exist; make it first", folder.display()));
-    }
-    if file.is_dir() || file.file_name().is_none() {
-        return refuse("it is a folder; give the name of a file in it");
-    }
+    let refuse = |what: &str| Err(Failure::input(format!("{option} {}: {what}", file.display())));
+    require_place(option, file)?;
     if file.metadata().is_ok_and(|about| !about.is_file()) {
         return refuse("it is not a regular file; give another name");
     }
