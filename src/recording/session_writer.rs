@@ -36,6 +36,8 @@ pub struct SessionWriter {
     before: (u64, u64),
     files: u32,
     begun_ns: u64,
+    /// Time of the latest tick or record, ns.
+    latest_ns: u64,
     /// The newest record of each kind that describes the session's present state.
     state: Vec<Record>,
     stage: Option<StageRecord>,
@@ -55,6 +57,7 @@ impl From<Writer> for SessionWriter {
             before: (0, 0),
             files: 1,
             begun_ns: 0,
+            latest_ns: 0,
             state: Vec::new(),
             stage: None,
             ran: None,
@@ -83,6 +86,7 @@ impl SessionWriter {
     /// When the present file cannot be written.
     pub fn tick(&mut self, tick: &Tick) -> Result<(), RecordingError> {
         self.rotate_if_due(tick.time_ns);
+        self.latest_ns = self.latest_ns.max(tick.time_ns);
         self.ran = tick.trial.or(self.ran);
         self.writer.tick(tick)
     }
@@ -100,6 +104,7 @@ impl SessionWriter {
             }
             self.stage = Some(*stage);
         }
+        self.latest_ns = self.latest_ns.max(stamped.time_ns);
         if is_state(record) {
             self.state.retain(|known| discriminant(known) != discriminant(record));
             self.state.push(record.clone());
@@ -116,11 +121,12 @@ impl SessionWriter {
         }
     }
 
-    /// Begins the next file at `time_ns` if the present one has reached a limit. If that fails, the present one goes on.
+    /// Begins the next file at `time_ns` if the present one has reached a limit and holds nothing later: a record can be ahead of
+    /// the ticks of its time. If that fails, the present one goes on.
     fn rotate_if_due(&mut self, time_ns: u64) {
         let Some((limits, _)) = &self.rotation else { return };
         let due = time_ns.saturating_sub(self.begun_ns) >= limits.duration_ns || self.writer.bytes() >= limits.bytes;
-        if !due || !self.between_trials() {
+        if !due || time_ns < self.latest_ns || !self.between_trials() {
             return;
         }
         let last = self.writer.path();

@@ -2,14 +2,18 @@
 
 use crate::recording as support;
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 
-use quadfrog::recording::player::Player;
-use quadfrog::recording::record::Stamped;
+use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::recording::recorder::{CollectedTicks, FAULT_TICKS, Recorder, RecorderHandle, TrialTicks};
+use quadfrog::recording::session_files::recordings_in;
+use quadfrog::recording::session_writer::{RotationLimits, SessionWriter};
+use quadfrog::recording::timeline::Timeline;
 use quadfrog::recording::writer::{Sink, Writer};
-use quadfrog::telemetry::{Mode, Tick};
+use quadfrog::telemetry::{Counters, Mode, Tick};
 use support::*;
 
 /// Runs a recorder on live ticks and records up to its end.
@@ -67,6 +71,31 @@ fn without_a_writer_trials_are_still_delivered() {
     let status = handle.join();
     assert_eq!((status.bytes, status.ticks, status.error, status.finished), (0, 0, None, false));
     assert_same(&trials, &trials_of(&ticks));
+}
+
+#[test]
+fn a_record_ahead_of_its_tick_makes_no_two_ticks_of_one_time_in_the_next_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let begin = |path: &Path, _| Writer::create(path, &session(), START_UTC_NS, &[]);
+    let limits = RotationLimits { bytes: u64::MAX, duration_ns: 20_000_000 };
+    let mut writer = SessionWriter::create(&path, limits, Box::new(begin)).unwrap();
+    let ticks: Vec<Tick> = (1..=30).map(moving_tick).collect();
+    let ahead = Stamped { time_ns: ticks[21].time_ns + 500_000, record: Record::Counters(Counters::default()) };
+    for (index, tick) in ticks.iter().enumerate() {
+        writer.tick(tick).unwrap();
+        if index == 18 {
+            writer.record(&ahead).unwrap();
+        }
+    }
+    writer.finish().0.unwrap();
+    let files = recordings_in(folder.path());
+    assert_eq!(files.len(), 2, "{files:?}");
+    let played = Timeline::open(&files).unwrap().filter_map(|played| match played {
+        Played::Tick(tick) => Some(tick.time_ns),
+        Played::Record(_) => None,
+    });
+    assert_eq!(played.collect::<Vec<_>>(), ticks.iter().map(|tick| tick.time_ns).collect::<Vec<_>>());
 }
 
 /// A disk that is full after some bytes and counts the syncs.
