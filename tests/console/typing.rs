@@ -97,6 +97,11 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     assert_shows(&without_value.screen(80, 24), &["`x` does not belong here: a number is typed; Esc cancels"]);
     assert_eq!(without_value.requests(&["Enter"]), []);
     assert_shows(&without_value.screen(80, 24), &["nothing was typed: a number of trials from 1 to 1000 is needed"]);
+    // No trial is promised that may not exist.
+    assert_eq!(console.requests(&["2", "/", "9", "9", "x", "Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["a character was not taken; Enter again looks for trial 99"]);
+    assert_eq!(console.requests(&["Enter"]), []);
+    assert_shows(&console.screen(80, 24), &["there is no trial 99"]);
     // The form of the overrides refuses a letter aloud, too.
     let mut console = Console::ready();
     assert_eq!(console.requests(&["o", "x"]), []);

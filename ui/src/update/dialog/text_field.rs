@@ -52,6 +52,9 @@ pub(super) fn key(
                 }
                 // The sentence names the character and what is taken.
                 ("", _) => format!("{}; Esc cancels", problem.unwrap_or_default()),
+                (trial, Purpose::TrialNumber | Purpose::Beside) => {
+                    acknowledges_refused_character(&format!("Enter again looks for trial {trial}"))
+                }
                 (number, _) => acknowledges_refused_character(&format!("Enter again confirms {number}")),
             });
         }
