@@ -48,7 +48,8 @@ pub fn require_place(option: &str, file: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a name that says another format than that of the first of `extensions`; one that says none passes. `contents` names what is written: "a report is a page in HTML".
+/// Refuses a name that says another format than that of the first of `extensions`; one that says none passes. `contents` names
+/// what is written: "a report is a page in HTML".
 pub fn require_format(file: &Path, extensions: &[&str], contents: &str) -> Result<(), Failure> {
     match file.extension() {
         Some(other) if !extensions.iter().any(|extension| has_extension(file, extension)) => {
