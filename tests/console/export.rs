@@ -162,13 +162,26 @@ fn damage_and_a_full_disk_are_errors_and_a_closed_pipe_is_none() {
     let output = program.run(&["export", "cut.mcap.part", "-o", "cut.csv"]);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");
-    assert_shows(&message, &["cut.mcap.part", "cut off", "what can be read is exported", "quadfrog recover"]);
+    assert_shows(
+        &message,
+        &["cut.mcap.part", "cut off", "what can be read is exported", "`quadfrog recover cut.mcap.part`"],
+    );
     // A trial that is whole in another file is exported without an error.
     fs::create_dir(program.path("both")).unwrap();
     fs::copy(&recording, program.path("both/session.mcap")).unwrap();
     fs::copy(program.path("cut.mcap.part"), program.path("both/session-2.mcap.part")).unwrap();
     program.text(&["export", "both", "--trial", "1", "-o", "trial.csv"]);
-    assert_eq!(program.run(&["export", "both", "-o", "both.csv"]).status.code(), Some(1));
+    let output = program.run(&["export", "both", "-o", "both.csv"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    // Regression: the advice named the folder, which `recover` refuses.
+    assert_shows(&message, &["`quadfrog recover both/session-2.mcap.part`"]);
+    assert!(!message.contains("the newest study"), "{message}");
+    // Regression: of a folder of studies one was exported, and nothing said which.
+    fs::create_dir(program.path("studies")).unwrap();
+    fs::rename(program.path("both"), program.path("studies/both")).unwrap();
+    let output = program.run(&["export", "studies", "--trial", "1", "-o", "trial.csv"]);
+    assert_shows(&String::from_utf8_lossy(&output.stderr), &["the newest study in it: studies/both"]);
     let rows = fs::read_to_string(program.path("cut.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, ticks(program.path("cut.mcap.part").to_str().unwrap()).len());
     assert!(rows > 1000);

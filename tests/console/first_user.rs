@@ -258,7 +258,7 @@ fn stop_closes_every_form_and_applies_nothing_of_it() {
     // The field of the bounds names a form without a space, because Space is STOP there.
     let mut console = Console::ready();
     console.press(&["4", "B"]);
-    assert_shows(&console.screen(80, 24), &["write it as 50..120 or 50,120, without a space"]);
+    assert_shows(&console.screen(80, 24), &["write it as 0.75..1.75 or 0.75,1.75, without a space"]);
     assert_eq!(console.press(&["1", "Space"]), [Effect::Stop]);
 }
 

@@ -6,7 +6,8 @@ use quadfrog::recording::timeline::TrialRun;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Fault, Mode, Phase, TransitionCause};
 use quadfrog::trial::{
-    ExperimentStage, FallRisk, PointRecord, Proposal, ProposalSource, QueuedPoint, SearchStatus, TrialRecord, Verdict,
+    ExperimentStage, FallRisk, PointRecord, Proposal, ProposalSource, QueuedPoint, SKIPPED, SearchStatus, TrialRecord,
+    Verdict,
 };
 use quadfrog_console::message::{Effect, Msg, ReplayCommand, ReplayStatus, ReplayTimeline};
 
@@ -355,6 +356,47 @@ fn an_override_says_nothing_of_the_field_that_was_left() {
     assert_shows(&console.screen(120, 40), &["a character was not taken; Enter again"]);
     console.press(&["Down"]);
     assert!(!console.screen(120, 40).contains("Enter again"), "{}", console.screen(120, 40));
+}
+
+/// Regression: the keys to the next fall passed a robot that fell where the trial was judged void.
+#[test]
+fn a_fall_is_found_whatever_its_verdict_is() {
+    let row = |number, suggested, verdict| (number, TrialRecord { suggested, ..trial(number, verdict, None) });
+    let [accept, fall, void] = [Verdict::Accept, Verdict::Fall, Verdict::Void].map(Some);
+    let rows =
+        [row(1, fall, void), row(2, accept, fall), row(3, fall, None), row(4, accept, accept), row(5, void, void)];
+    let timeline = ReplayTimeline { rows: rows.into(), ..ReplayTimeline::default() };
+    assert_eq!([0, 1, 2, 3, 4, 5].map(|number| timeline.fell(number)), [false, true, true, true, false, false]);
+}
+
+/// Regression: a trial that was not run was "not in this recording" where the playhead was before its proposal.
+#[test]
+fn a_trial_that_was_not_run_is_named_so_wherever_the_playhead_is() {
+    let mut console = Console::ready();
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let skipped = TrialRecord { cause: SKIPPED.into(), ..trial(7, Some(Verdict::Void), None) };
+    let timeline = ReplayTimeline { rows: [(7, skipped)].into(), ..ReplayTimeline::default() };
+    console.update(Msg::Timeline(Box::new(timeline)));
+    console.press(&["G"]);
+    console.enter("#7");
+    console.press(&["Enter"]);
+    assert_shows(&console.screen(80, 24), &["trial 7 was not run"]);
+}
+
+/// Regression: the question before a proposal is skipped did not say that the last verdict becomes final.
+#[test]
+fn skipping_says_that_the_last_verdict_stays() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
+    console.record(Record::Proposal(proposal(1, 0)));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    console.mode(Mode::Ready);
+    console.press(&["n"]);
+    let screen = console.screen(80, 24);
+    assert_shows(
+        &screen,
+        &["Skip the proposal?", "The verdict of trial #0 then stays: u does not take it back any longer."],
+    );
 }
 
 /// Regression: the question before quitting did not say that the last verdict becomes final.

@@ -58,6 +58,12 @@ fn a_recording_of_a_running_session_is_not_called_damaged() {
     let (mut session, study) = console(&program);
     let part = study.join("session.mcap.part");
     assert_shows(&program.text(&["replay", "--check", part.to_str().unwrap()]), &["a session still writes it"]);
+    // Regression: its export failed, with the advice to recover the folder.
+    let export = program.run(&["export", study.to_str().unwrap(), "-o", "signals.csv"]);
+    let message = String::from_utf8_lossy(&export.stderr);
+    assert_eq!(export.status.code(), Some(0), "{message}");
+    assert_shows(&message, &["session.mcap.part: a session still writes it; it is exported up to"]);
+    assert!(!message.contains("recover"), "{message}");
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
     command.args(["replay", part.to_str().unwrap()]);
     let mut replay = Session::run(&program.path("."), SIZE, command);

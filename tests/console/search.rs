@@ -137,12 +137,12 @@ fn bounds_are_checked_and_each_refusal_is_explained() {
     }
     let mut open = overriding();
     open.press(&["B"]);
-    assert_shows(&open.screen(80, 24), &["write it as 50..120 or 50,120, without a space"]);
+    assert_shows(&open.screen(80, 24), &["write it as 0..150 or 0,150, without a space"]);
     for (text, reason) in [
         ("120..50", "120 is not below 50"),
-        ("50", "is no range; write it as 50..120"),
+        ("50", "is no range; write it as 0..150"),
         ("50..fast", "was not taken"),
-        ("50,60,70", "is no range; write it as 50..120 or 50,120"),
+        ("50,60,70", "is no range; write it as 0..150 or 0,150"),
         ("50..220", "Fx may be searched from 0 to 200 N (safety.toml)"),
     ] {
         let (sent, screen) = typed(text);

@@ -166,7 +166,7 @@ fn no_dialog_and_no_message_has_a_number_of_17_digits() {
     }
     console.press(&["4", "B", "1"]);
     console.press(&["Enter"]);
-    assert_shows(&console.screen(80, 24), &["write it as 50..120"]);
+    assert_shows(&console.screen(80, 24), &["write it as 0.3..1.54916"]);
 }
 
 /// Regression: the field for a time, a trial or the best said that a number is typed.
@@ -288,7 +288,7 @@ fn the_form_of_the_overrides_asks_before_it_uses_a_number_without_a_refused_char
     console.press(&["o", "Down", "1", "O", "2", "F5"]);
     assert_shows(
         &console.screen(80, 24),
-        &["`O` does not belong here", "Enter, Up, Down and Q ask again, Esc drops the number."],
+        &["`O` does not belong here", "Enter, Up, Down and Q work when pressed twice, Esc drops the number."],
     );
     assert_eq!(console.requests(&["Q"]), []);
     assert_shows(&console.screen(80, 24), &["a character was not taken; Q again queues 12"]);
@@ -318,7 +318,7 @@ fn a_number_after_a_key_that_asked_is_a_new_one() {
     assert_shows(&console.screen(80, 24), &["f0 = 100 Hz is outside"]);
     // Without a number no key that moves asks.
     console.press(&["Esc", "x"]);
-    assert_shows(&console.screen(80, 24), &["Enter and Q ask again, Esc cancels."]);
+    assert_shows(&console.screen(80, 24), &["Enter and Q work when pressed twice, Esc cancels."]);
     console.press(&["Down"]);
     console.enter("105");
     let request = OperatorRequest::Override { parameter: "Fx".into(), value: 105.0 };
@@ -332,7 +332,7 @@ fn enter_is_not_said_to_confirm_before_a_refused_character_is_acknowledged() {
     console.press(&["=", "z"]);
     console.enter("0.44");
     let last = |console: &mut Console| console.screen(80, 24).lines().last().unwrap_or_default().to_owned();
-    assert_shows(&last(&mut console), &["Enter asks again, Esc cancels. Space is STOP."]);
+    assert_shows(&last(&mut console), &["Enter twice confirms, Esc cancels. Space is STOP."]);
     assert_eq!(console.requests(&["Enter"]), []);
     assert_shows(&last(&mut console), &["Enter confirms, Esc cancels. Space is STOP."]);
 }
@@ -351,7 +351,7 @@ fn a_form_that_is_open_over_a_stop_says_first_how_it_is_kept() {
     // Another person's STOP closes no form.
     for (keys, step) in [
         (&["=", "1"][..], "FAULT: Enter uses the value, Esc drops it; then k acknowledges."),
-        (&["=", "1", "m"], "FAULT: Enter asks again, Esc cancels; then k acknowledges."),
+        (&["=", "1", "m"], "FAULT: Enter twice confirms, Esc cancels; then k acknowledges."),
         (&["2", "/"], "FAULT: Enter confirms, Esc cancels; then k acknowledges."),
     ] {
         let mut console = Console::review(Mode::Review, Verdict::Accept);

@@ -332,9 +332,9 @@ impl ReplayTimeline {
         }
     }
 
-    /// Whether a trial fell or tripped a limit, by its verdict or else its suggestion.
+    /// Whether a trial was judged a fall, or fell or tripped a limit whatever its verdict is.
     pub fn fell(&self, trial: u32) -> bool {
-        self.rows.get(&trial).and_then(|row| row.verdict.or(row.suggested)) == Some(Verdict::Fall)
+        self.rows.get(&trial).is_some_and(|row| [row.verdict, row.suggested].contains(&Some(Verdict::Fall)))
     }
 
     /// The verdict of a trial; none before it is judged.

@@ -4,7 +4,7 @@ use quadfrog::optimize::ask::Direction;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::ReportedStudy;
 use quadfrog::report::{study_page, text};
-use quadfrog::trial::{Displacement, JudgedBy, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{Displacement, JudgedBy, ParameterInfo, TrialRecord, Verdict, six_digits};
 
 use crate::column::Column;
 use crate::message::ExportedRows;
@@ -19,6 +19,12 @@ pub fn remark(trial: &TrialRecord) -> String {
         (note, "") => format!("{note} |"),
         (note, cause) => format!("{note} | {cause}"),
     }
+}
+
+/// The bounds of a parameter as an operator types others.
+pub fn range_example(parameter: &ParameterInfo) -> String {
+    let [low, high] = [parameter.low, parameter.high].map(six_digits);
+    format!("{low}..{high} or {low},{high}")
 }
 
 /// Returns the tables of the session's study as lines of at most `width` characters, as `quadfrog report` prints them.

@@ -197,7 +197,7 @@ impl Purpose {
         match self {
             Purpose::Continue | Purpose::Fix { .. } => Some("a number of trials from 1 to 1000"),
             Purpose::ConfirmBest => Some("a number of repeats from 1 to 1000"),
-            Purpose::Bounds { .. } => Some("a range as 50..120"),
+            Purpose::Bounds { .. } => Some("a range as LOW..HIGH"),
             Purpose::TrialNumber | Purpose::Beside => Some("the number of a trial"),
             Purpose::Seek => Some("a time, #7 for a trial, best or fall"),
             Purpose::HandValue(_)

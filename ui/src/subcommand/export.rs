@@ -18,6 +18,7 @@ use super::arguments::{one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
 use super::output_file::write_file;
+use super::replay::is_in_progress;
 use super::table::{table_format, written_format};
 
 /// Viewer with a layout for recordings.
@@ -110,6 +111,10 @@ fn export_layout(layout: LayoutOf, output: Option<&Path>) -> Result<(), Failure>
 fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
     let format = written_format(arguments.format, arguments.output.as_deref())?;
     let files = recordings_of(file).map_err(Failure::input)?;
+    // Of a folder of studies it is one that has recordings.
+    if let Some(study) = files[0].parent().filter(|study| file.is_dir() && *study != file) {
+        notice!("the newest study in it: {}", study.display());
+    }
     let mut players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     players.sort_by_key(|player| player.start_utc_ns().saturating_add(player.first_ns()));
     let one_session = players.windows(2).all(|pair| pair[0].start_utc_ns() == pair[1].start_utc_ns());
@@ -142,12 +147,18 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
             written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,
         },
     }
-    match players.iter().filter_map(Player::damage).collect::<Vec<_>>() {
+    let (in_progress, others): (Vec<_>, Vec<_>) = players.iter().partition(|player| is_in_progress(player));
+    for player in in_progress {
+        let end_s = player.duration_ns() as f64 / 1e9;
+        notice!("{}: a session still writes it; it is exported up to {end_s:.3} s", player.path().display());
+    }
+    let damage = |player: &&Player| {
+        let way = format!("`quadfrog recover {}` keeps what can be read", player.path().display());
+        player.damage().map(|damage| format!("{damage}; {way}"))
+    };
+    match others.iter().filter_map(damage).collect::<Vec<_>>() {
         damage if damage.is_empty() => Ok(()),
-        damage => {
-            let way = format!("`quadfrog recover {}` mends a file that was not finished", file.display());
-            Err(Failure::Other(anyhow!("{}; what can be read is exported; {way}", damage.join("\n"))))
-        }
+        damage => Err(Failure::Other(anyhow!("{}\n  what can be read is exported", damage.join("\n")))),
     }
 }
 

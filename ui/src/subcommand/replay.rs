@@ -168,6 +168,12 @@ fn is_written(file: &Path) -> bool {
         && matches!(running_session(folder), Ok(Some(_)))
 }
 
+/// Whether nothing is missing in a recording but the end that a session has not written yet.
+pub fn is_in_progress(player: &Player) -> bool {
+    let cut = player.cut().map(|cut| format!("{}{cut}", named_in(player.path())));
+    cut.is_some() && player.damage() == cut && is_written(player.path())
+}
+
 /// Returns how a line about damage begins that is about `file`.
 fn named_in(file: &Path) -> String {
     format!("{}: ", file.display())
@@ -195,12 +201,11 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         let [from_s, to_s] = [lost.from_ns, lost.to_ns].map(|time_ns| time_ns as f64 / 1e9);
         put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);
     }
-    let damage = player.damage();
-    let cut = player.cut().map(|cut| format!("{}{cut}", named_in(file)));
-    if cut.is_some() && damage == cut && extras.is_empty() && is_written(file) {
+    if extras.is_empty() && is_in_progress(&player) {
         put_line!("  a session still writes it");
         return Ok(true);
     }
+    let damage = player.damage();
     for line in damage.iter().chain(&extras) {
         put_line!("  {line}");
     }

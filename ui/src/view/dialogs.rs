@@ -27,6 +27,7 @@ use crate::layout::MIN_COLUMNS;
 use crate::legal::palette;
 use crate::model::Model;
 use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose};
+use crate::text::range_example;
 use crate::theme::{Glyphs, Role, Theme};
 use crate::wrap::{wrap, wrap_all};
 use crate::{arming, help};
@@ -314,7 +315,8 @@ fn field(
             let allowed = searched.map_or(String::new(), |p| {
                 format!("; safety.toml allows {} to {}", six_digits(p.least), six_digits(p.most))
             });
-            format!("write it as 50..120 or 50,120, without a space{allowed}; past trials stay")
+            let example = info.map_or(String::new(), range_example);
+            format!("write it as {example}, without a space{allowed}; past trials stay")
         }
         Purpose::Fix { parameter, .. } => {
             let name = model.session.info.parameters.get(parameter).map_or("it", |info| &info.name);

@@ -161,9 +161,9 @@ fn live(model: &Model) -> NextStep {
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
         mode @ (Mode::Disarmed | Mode::Ready) if finished => {
             let more = [(Action::Continue, "more trials"), (Action::ConfirmBest, "confirm best")];
-            let end = if mode == Mode::Disarmed { quit } else { sit_down };
+            let (first, last) = if mode == Mode::Disarmed { (quit, None) } else { (sit_down, Some(quit)) };
             let rest = [(Action::ExportBest, "export"), undo];
-            step("The study is finished.", model, &[&[end], &more[..], &rest].concat())
+            step("The study is finished.", model, &[&[first], &more[..], &rest, last.as_slice()].concat())
         }
         Mode::Disarmed => {
             let lead = match session.failing_checks() {
@@ -330,7 +330,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
 /// The two ends of a form with values of the operator, the one that keeps them first; none of another dialog.
 fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
     Some(match dialog {
-        _ if dialog.has_refused_character() => "Enter asks again, Esc cancels",
+        _ if dialog.has_refused_character() => "Enter twice confirms, Esc cancels",
         Dialog::Override(_) => "Enter applies, Esc drops the values",
         Dialog::Field { purpose: Purpose::Note(_), .. } => "Enter keeps the note, Esc drops it",
         Dialog::Field { purpose: Purpose::HandValue(_), .. } => "Enter uses the value, Esc drops it",
@@ -366,7 +366,7 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Override(form) if dialog.has_refused_character() => {
             let (keys, esc) =
                 if form.typing.is_some() { ("Enter, Up, Down", "drops the number") } else { ("Enter", "cancels") };
-            format!("{keys} and {} ask again, Esc {esc}.", key(Action::QueuePoint))
+            format!("{keys} and {} work when pressed twice, Esc {esc}.", key(Action::QueuePoint))
         }
         Dialog::Override(form) if form.typing.is_none() => {
             let queue = key(Action::QueuePoint);
@@ -408,7 +408,7 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         }
         Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
         Dialog::Field { .. } => {
-            let enter = if dialog.has_refused_character() { "Enter asks again" } else { "Enter confirms" };
+            let enter = if dialog.has_refused_character() { "Enter twice confirms" } else { "Enter confirms" };
             let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
             format!("{enter}, Esc cancels.{space}")
         }

@@ -26,6 +26,13 @@ fn answers_or(default: &str, theme: &Theme, key: &str, text: &str) -> Line<'stat
     ])
 }
 
+/// The sentence that the last verdict becomes final; none where it is.
+fn last_verdict_stays(model: &Model) -> Option<Line<'static>> {
+    let undo = model.keymap.key(Action::Undo);
+    let text = |trial| format!("The verdict of trial #{trial} then stays: {undo} does not take it back any longer.");
+    model.session.undoable().map(text).map(Line::from)
+}
+
 pub fn take_control(model: &Model) -> Vec<Line<'static>> {
     let heard = match model.mode() {
         Mode::Offline => {
@@ -148,8 +155,10 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
         Question::Skip { trial, .. } => {
             let text =
                 format!("Trial #{trial} will not be run; the sampler does not see it. Another proposal follows.");
-            let answer = answers(&model.theme, "y", "skip");
-            ("Skip the proposal?", vec![Line::from(text), Line::default(), answer])
+            let mut lines = vec![Line::from(text)];
+            lines.extend(last_verdict_stays(model));
+            lines.extend([Line::default(), answers(&model.theme, "y", "skip")]);
+            ("Skip the proposal?", lines)
         }
         Question::Rerun { trial } => {
             let confirms = |source: ProposalSource| source == ProposalSource::Confirm;
@@ -220,12 +229,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
         Question::EndRepeats => {
             let left = counted(model.session.confirming().unwrap_or(0) as usize, "repeat");
             let mut lines = vec![Line::from(format!("{left} will not be run: the best is not confirmed."))];
-            lines.extend(model.session.undoable().map(|trial| {
-                let undo = model.keymap.key(Action::Undo);
-                Line::from(format!(
-                    "The verdict of trial #{trial} then stays: {undo} does not take it back any longer."
-                ))
-            }));
+            lines.extend(last_verdict_stays(model));
             lines.extend([Line::default(), answers(&model.theme, "y", "end them")]);
             ("End the repeats?", lines)
         }

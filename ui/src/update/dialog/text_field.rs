@@ -14,6 +14,7 @@ use crate::model::dialog::{
     Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question, acknowledges_refused_character, is_refused_character,
     places,
 };
+use crate::text::range_example;
 use crate::update::beside::chosen;
 use crate::update::rejudged;
 use crate::update::request::{cancelled, reply, request};
@@ -193,7 +194,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
         return if known {
             Ok(ReplayCommand::Trial(trial))
         } else {
-            let row = model.session.trials.records.get(&trial);
+            let row = model.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
             Err(match row.is_some_and(TrialRecord::was_not_run) {
                 true => format!("trial {trial} was not run: there is no jump to show"),
                 false => format!("trial {trial} is not in this recording"),
@@ -234,7 +235,9 @@ fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest
     // A comma separates two numbers, or the decimals of each where `..` separates them.
     let parts = text.split_once("..").or_else(|| text.split_once(',').filter(|(_, high)| !high.contains(',')));
     let ends = parts.and_then(|(low, high)| Some((number(low)?, number(high)?)));
-    let Some((low, high)) = ends else { return Err(format!("`{text}` is no range; write it as 50..120 or 50,120")) };
+    let Some((low, high)) = ends else {
+        return Err(format!("`{text}` is no range; write it as {}", range_example(info)));
+    };
     if low >= high {
         return Err(format!("{low} is not below {high}"));
     }
