@@ -377,13 +377,19 @@ fn parse<T: DeserializeOwned>(
     origins: &HashMap<&'static str, FileOrigin>,
 ) -> Result<T, ConfigError> {
     let (table, origin) = (&tables[name], &origins[name]);
-    serde_path_to_error::deserialize(toml::Value::Table(table.clone())).map_err(|error| {
-        let key = error.path().to_string();
-        // An entry of a list has the line of its list.
-        let key = key.split('[').next().unwrap_or(&key);
-        let value = lookup(table, key).map(toml::Value::to_string).unwrap_or_default();
-        origin.refuse(key, value, without_type_names(error.inner().message()))
+    table.clone().try_into().map_err(|error: toml::de::Error| {
+        let key = key_of(&error);
+        let value = lookup(table, &key).map(toml::Value::to_string).unwrap_or_default();
+        origin.refuse(&key, value, without_type_names(error.message()))
     })
+}
+
+/// Returns the key, with its tables, at which a decoder of values failed; empty at the top. An entry of a list has the key of its list.
+fn key_of(error: &toml::de::Error) -> String {
+    // The error's text alone names it, in its last line.
+    let text = error.to_string();
+    let key = text.lines().last().and_then(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+    key.unwrap_or_default().to_owned()
 }
 
 /// Returns a decoder's message with the names of Rust types replaced.

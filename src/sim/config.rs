@@ -231,8 +231,7 @@ impl SimConfig {
         let syntax = |reason: String| SimError::Syntax { reason };
         let table: toml::Table = toml::from_str(text).map_err(|e| syntax(e.to_string()))?;
         // As `config` reads it: by another way, the fields of thirteen structs would be compiled once more.
-        let config: SimConfig =
-            serde_path_to_error::deserialize(toml::Value::Table(table)).map_err(|e| syntax(e.to_string()))?;
+        let config: SimConfig = table.try_into().map_err(|e: toml::de::Error| syntax(e.to_string()))?;
         config.check()?;
         Ok(config)
     }
