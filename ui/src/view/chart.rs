@@ -5,7 +5,7 @@ use quadfrog::telemetry::Phase;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::dots::DotGrid;
+use super::dots::{DotGrid, dots_across};
 use super::draw::truncate;
 use super::series_style::SeriesStyle;
 use crate::model::comparison::time_after;
@@ -71,6 +71,10 @@ pub struct Chart<'a> {
     pub range: (f32, f32),
     pub axis: TimeAxis,
     pub history: &'a SignalHistory,
+    /// What it draws of the samples in the window.
+    pub curve: &'a Curve,
+    /// The column of each of these samples, from [`sample_columns`].
+    pub columns: &'a [SampleColumn],
     /// The phase of each column, from [`phases`].
     pub phases: &'a [Option<Phase>],
     /// A trial to lay under the samples.
@@ -84,14 +88,41 @@ pub struct Chart<'a> {
     pub theme: Theme,
 }
 
+/// A series in the window, read once: a sample has half a kilobyte, and what a chart draws of it four bytes.
+pub struct Curve {
+    values: Vec<f32>,
+    /// Empty for a series that is not commanded.
+    commanded: Vec<f32>,
+}
+
+/// Time of a sample, ns, and its column of dots; none outside of the window.
+pub type SampleColumn = (u64, Option<usize>);
+
+/// The columns of the samples in the window on every chart of this width.
+pub fn sample_columns(axis: &TimeAxis, history: &SignalHistory, width: u16, glyphs: Glyphs) -> Vec<SampleColumn> {
+    let across = dots_across(width, glyphs);
+    history.window(axis.window_ns).map(|sample| (sample.time_ns, axis.column(sample.time_ns, across))).collect()
+}
+
 impl SeriesStyle {
+    pub fn curve(&self, history: &SignalHistory, axis: &TimeAxis) -> Curve {
+        let samples = || history.window(axis.window_ns);
+        Curve {
+            values: samples().map(|sample| self.value(sample)).collect(),
+            commanded: samples().map_while(|sample| self.commanded(sample)).collect(),
+        }
+    }
+
     /// The first of the series' ranges that holds what is drawn of it.
-    pub fn range_of(&self, history: &SignalHistory, axis: &TimeAxis, ghost: Option<Ghost<'_>>) -> usize {
+    pub fn range_of(&self, curve: &Curve, ghost: Option<Ghost<'_>>) -> usize {
         let ghost = ghost.iter().flat_map(|ghost| ghost.trace);
-        let samples = history.window(axis.window_ns).chain(ghost);
-        let values = samples.flat_map(|sample| [Some(self.value(sample)), self.commanded(sample)]);
-        let (low, high) = values
-            .flatten()
+        let ghost = ghost.flat_map(|sample| [Some(self.value(sample)), self.commanded(sample)]).flatten();
+        let (low, high) = curve
+            .values
+            .iter()
+            .chain(&curve.commanded)
+            .copied()
+            .chain(ghost)
             .filter(|value| value.is_finite())
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         let holds = |range: &(f32, f32)| low >= range.0 && high <= range.1;
@@ -117,15 +148,12 @@ impl Chart<'_> {
         if let Some(ghost) = self.ghost {
             self.draw_ghost(buffer, plot, ghost, (low, high));
         }
-        let commanded = self.history.window(self.axis.window_ns);
-        let commanded = commanded.filter_map(|sample| Some((sample.time_ns, self.style.commanded(sample)?)));
-        let mut dots = DotGrid::new(plot, self.theme.glyphs);
-        self.trace(&mut dots, commanded, (low, high), true);
-        dots.draw(buffer, plot, self.theme.style(Role::Ghost));
-        let mut dots = DotGrid::new(plot, self.theme.glyphs);
-        let samples = self.history.window(self.axis.window_ns).map(|sample| (sample.time_ns, self.style.value(sample)));
-        self.trace(&mut dots, samples, (low, high), false);
-        dots.draw(buffer, plot, self.theme.style(self.style.role));
+        let curves = [(&self.curve.commanded, Role::Ghost, true), (&self.curve.values, self.style.role, false)];
+        for (values, role, dotted) in curves {
+            let mut dots = DotGrid::new(plot, self.theme.glyphs);
+            trace(&mut dots, self.columns.iter().copied().zip(values.iter().copied()), (low, high), dotted);
+            dots.draw(buffer, plot, self.theme.style(role));
+        }
         self.shade(buffer, plot);
         self.draw_cursor(buffer, plot);
     }
@@ -243,52 +271,15 @@ impl Chart<'_> {
         if value.abs() >= 100.0 { format!("{value:+.0}") } else { format!("{value:+.decimals$}") }
     }
 
-    /// Sets the dots of a line through the points, as far as the axis shows them; `dotted` leaves out two columns of four.
-    fn trace(
-        &self,
-        dots: &mut DotGrid,
-        points: impl Iterator<Item = (u64, f32)>,
-        (low, high): (f32, f32),
-        dotted: bool,
-    ) {
-        let (across, down) = dots.size;
-        if across == 0 || down == 0 {
-            return;
-        }
-        let mut before: Option<(u64, usize, i64)> = None;
-        for (time_ns, value) in points {
-            let at = self.axis.column(time_ns, across).filter(|_| value.is_finite());
-            before = at.map(|x| {
-                let y = ((high - value) / (high - low) * down as f32) as i64;
-                let y = y.clamp(0, down as i64 - 1);
-                // Joined to the sample before in this or the next column, or in a thinned trace; not to one at the other end of
-                // the chart, nor over a gap in which nothing was received.
-                let joined = |(t0, x0, _): &(u64, usize, i64)| {
-                    x.wrapping_sub(*x0) <= 1 || x > *x0 && time_ns.saturating_sub(*t0) <= THINNED_NS
-                };
-                let (x0, y0) = before.filter(joined).map_or((x, y), |(_, x0, y0)| (x0, y0));
-                for column in (x0 + 1).min(x)..=x {
-                    // The part of the line in this column.
-                    let at = |column: usize| y0 + (y - y0) * (column - x0) as i64 / (x - x0).max(1) as i64;
-                    let (from, to) = if x > x0 { (at(column - 1), at(column)) } else { (y0, y) };
-                    let drawn = !dotted || column % 4 < 2;
-                    for y in (from.min(to)..=from.max(to)).filter(|_| drawn) {
-                        dots.set(column as i64, y);
-                    }
-                }
-                (time_ns, x, y)
-            });
-        }
-    }
-
     /// The ghost's samples at the time that they would have if its impulse had begun where the axis says.
     fn draw_ghost(&self, buffer: &mut Buffer, plot: Rect, ghost: Ghost, range: (f32, f32)) {
         let mut dots = DotGrid::new(plot, self.theme.glyphs);
-        let points = ghost
-            .trace
-            .iter()
-            .map(|sample| (time_after(ghost.start_ns, sample.trial_time_s), self.style.value(sample)));
-        self.trace(&mut dots, points, range, ghost.named);
+        let points = ghost.trace.iter().map(|sample| {
+            let time_ns = time_after(ghost.start_ns, sample.trial_time_s);
+            ((time_ns, self.axis.column(time_ns, dots.size.0)), self.style.value(sample))
+        });
+        let points: Vec<_> = points.collect();
+        trace(&mut dots, points.into_iter(), range, ghost.named);
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
 
@@ -348,6 +339,37 @@ pub fn draw_time_axis(buffer: &mut Buffer, area: Rect, axis: &TimeAxis, origin_n
             buffer.set_string(x, area.y, &text, theme.style(Role::Quiet));
             free = x + text.len() as u16 + 1;
         }
+    }
+}
+
+/// Sets the dots of a line through the points, as far as the axis shows them; `dotted` leaves out two columns of four.
+fn trace(dots: &mut DotGrid, points: impl Iterator<Item = (SampleColumn, f32)>, (low, high): (f32, f32), dotted: bool) {
+    let (across, down) = dots.size;
+    if across == 0 || down == 0 {
+        return;
+    }
+    let mut before: Option<(u64, usize, i64)> = None;
+    for ((time_ns, column), value) in points {
+        before = column.filter(|_| value.is_finite()).map(|x| {
+            let y = ((high - value) / (high - low) * down as f32) as i64;
+            let y = y.clamp(0, down as i64 - 1);
+            // Joined to the sample before in this or the next column, or in a thinned trace; not to one at the other end of
+            // the chart, nor over a gap in which nothing was received.
+            let joined = |(t0, x0, _): &(u64, usize, i64)| {
+                x.wrapping_sub(*x0) <= 1 || x > *x0 && time_ns.saturating_sub(*t0) <= THINNED_NS
+            };
+            let (x0, y0) = before.filter(joined).map_or((x, y), |(_, x0, y0)| (x0, y0));
+            for column in (x0 + 1).min(x)..=x {
+                // The part of the line in this column.
+                let at = |column: usize| y0 + (y - y0) * (column - x0) as i64 / (x - x0).max(1) as i64;
+                let (from, to) = if x > x0 { (at(column - 1), at(column)) } else { (y0, y) };
+                let drawn = !dotted || column % 4 < 2;
+                for y in (from.min(to)..=from.max(to)).filter(|_| drawn) {
+                    dots.set(column as i64, y);
+                }
+            }
+            (time_ns, x, y)
+        });
     }
 }
 

@@ -14,6 +14,11 @@ fn resolution(glyphs: Glyphs) -> (usize, usize) {
     }
 }
 
+/// The columns of dots in a width.
+pub fn dots_across(width: u16, glyphs: Glyphs) -> usize {
+    usize::from(width) * resolution(glyphs).0
+}
+
 /// The character with these dots set (`dots[x][y]`, from the top).
 fn character(glyphs: Glyphs, dots: &[[bool; 4]; 2]) -> char {
     // Unicode 16, Braille Patterns: bits of the dots 1-8, by column and row.
@@ -45,8 +50,7 @@ pub struct DotGrid {
 
 impl DotGrid {
     pub fn new(area: Rect, glyphs: Glyphs) -> DotGrid {
-        let (across, down) = resolution(glyphs);
-        let size = (usize::from(area.width) * across, usize::from(area.height) * down);
+        let size = (dots_across(area.width, glyphs), usize::from(area.height) * resolution(glyphs).1);
         DotGrid { glyphs, size, set: vec![false; size.0 * size.1] }
     }
 

@@ -8,7 +8,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::chart::{Chart, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns};
+use super::chart::{Chart, Curve, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns, sample_columns};
 use super::draw::{NO_STATE, bar, heading, span, without_sign_of_zero};
 use super::series_style::{SeriesStyle, style};
 use super::{beside, objective, points, proposal, trials, wireframe};
@@ -209,13 +209,16 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let of_columns: Vec<_> = columns(strip)
         .iter()
         .map(|cell| plot_columns(*cell))
-        .map(|cell| (cell, phases(&source.axis, &source.history, cell.width)))
+        .map(|cell| {
+            let columns = sample_columns(&source.axis, &source.history, cell.width, theme.glyphs);
+            (cell, phases(&source.axis, &source.history, cell.width), columns)
+        })
         .collect();
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     let middle_tick = rows.iter().all(|row| row.height > CHART_ROWS);
     let drawn: Vec<SeriesStyle> = series.iter().take(across * down).map(|series| style(*series, model)).collect();
-    let own: Vec<usize> =
-        drawn.iter().map(|style| style.range_of(&source.history, &source.axis, source.ghost)).collect();
+    let curves: Vec<Curve> = drawn.iter().map(|style| style.curve(&source.history, &source.axis)).collect();
+    let own: Vec<usize> = drawn.iter().zip(&curves).map(|(style, curve)| style.range_of(curve, source.ghost)).collect();
     for (index, style) in drawn.iter().enumerate() {
         // Charts of the same quantity have the same axis.
         let alike = drawn.iter().zip(&own).filter(|(other, _)| other.ranges == style.ranges);
@@ -225,6 +228,8 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
             range: style.ranges.get(range).copied().unwrap_or((-1.0, 1.0)),
             axis: source.axis,
             history: &source.history,
+            curve: &curves[index],
+            columns: &of_columns[index % across].2,
             phases: &of_columns[index % across].1,
             ghost: source.ghost,
             cursor_ns: source.cursor_ns,
@@ -235,7 +240,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
         chart.draw(frame.buffer_mut(), columns(rows[index / across])[index % across]);
     }
     // The charts side by side have the same times: the names stand under the left ones, the description under the right ones.
-    for (cell, phases) in of_columns.iter().take(1) {
+    for (cell, phases, _) in of_columns.iter().take(1) {
         draw_phases(frame.buffer_mut(), *cell, phases, &theme);
     }
     if times_rows > 0 {
