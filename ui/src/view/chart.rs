@@ -71,7 +71,7 @@ pub struct Chart<'a> {
     pub range: (f32, f32),
     pub axis: TimeAxis,
     pub history: &'a SignalHistory,
-    /// What it draws of the samples in the window.
+    /// Its values in the window.
     pub curve: &'a Curve,
     /// The column of each of these samples, from [`sample_columns`].
     pub columns: &'a [SampleColumn],
