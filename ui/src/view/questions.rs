@@ -26,7 +26,7 @@ fn answers_or(default: &str, theme: &Theme, key: &str, text: &str) -> Line<'stat
     ])
 }
 
-/// The sentence that the last verdict becomes final; none where it is.
+/// The sentence that the last verdict becomes final; none where it is final already.
 fn last_verdict_stays(model: &Model) -> Option<Line<'static>> {
     let undo = model.keymap.key(Action::Undo);
     let text = |trial| format!("The verdict of trial #{trial} then stays: {undo} does not take it back any longer.");
