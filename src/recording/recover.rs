@@ -13,6 +13,7 @@ use super::error::RecordingError;
 use super::event_index;
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
+use crate::trial::counted_are;
 
 /// Result of a recovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,8 +80,8 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
     let copied = named.inspect_err(|_| drop(fs::remove_file(&unfinished)))?;
     let damaged = [
         (copied.damaged_chunks > 0)
-            .then(|| format!("{} of {} chunks are damaged", copied.damaged_chunks, container.chunks.len())),
-        (copied.damaged_extras > 0).then(|| format!("{} attachments are damaged", copied.damaged_extras)),
+            .then(|| format!("{} of {} damaged", copied.damaged_chunks, counted_are(container.chunks.len(), "chunk"))),
+        (copied.damaged_extras > 0).then(|| format!("{} damaged", counted_are(copied.damaged_extras, "attachment"))),
     ];
     let lost: Vec<_> = container.cut.take().into_iter().chain(damaged.into_iter().flatten()).collect();
     Ok(Recovered {

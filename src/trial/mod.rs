@@ -25,6 +25,11 @@ pub fn counted(number: usize, thing: &str) -> String {
     if number == 1 { format!("1 {thing}") } else { format!("{number} {thing}s") }
 }
 
+/// Returns a number of things and their verb, "1 chunk is" or "5 chunks are".
+pub(crate) fn counted_are(number: usize, thing: &str) -> String {
+    format!("{} {}", counted(number, thing), if number == 1 { "is" } else { "are" })
+}
+
 /// Returns a number for a message: at most six significant digits, without zeros at the end.
 pub fn six_digits(value: f64) -> String {
     format!("{value:.5e}").parse::<f64>().unwrap_or(value).to_string()

@@ -161,7 +161,7 @@ fn the_dialog_of_a_confirmation_says_how_many_repeats_it_takes() {
     }
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 6, can_undo: true, jumps: 0 }));
     console.press(&["K"]);
-    let note = "the verdict of trial 5 then stays: u does not take it back any longer";
+    let note = "The verdict of trial #5 then stays: u does not take it back any longer.";
     assert_shows(&joined(&console.screen(80, 24)), &["to compare them takes", note]);
 }
 
@@ -260,6 +260,19 @@ fn stop_closes_every_form_and_applies_nothing_of_it() {
     console.press(&["4", "B"]);
     assert_shows(&console.screen(80, 24), &["write it as 0.75..1.75 or 0.75,1.75, without a space"]);
     assert_eq!(console.press(&["1", "Space"]), [Effect::Stop]);
+}
+
+/// Regression: once the bounds were changed, the field and its refusal gave the first bounds as the example.
+#[test]
+fn the_example_of_bounds_is_the_present_ones() {
+    let mut console = Console::ready();
+    let narrowed = SearchedParameter { name: "f0".into(), low: 0.9, high: 1.5, least: 0.5, most: 3.0, fixed: None };
+    console.record(Record::Search(SearchStatus { parameters: vec![narrowed], ..SearchStatus::default() }));
+    console.press(&["4", "B"]);
+    assert_shows(&console.screen(80, 24), &["write it as 0.9..1.5 or 0.9,1.5, without a space"]);
+    console.enter("1");
+    console.press(&["Enter"]);
+    assert_shows(&joined(&console.screen(80, 24)), &["`1` is no range; write it as 0.9..1.5 or 0.9,1.5"]);
 }
 
 /// Regression: values outside of the configured bounds were drawn at the edge of an axis that ended at these, right of their own number.

@@ -383,14 +383,20 @@ fn a_trial_that_was_not_run_is_named_so_wherever_the_playhead_is() {
     assert_shows(&console.screen(80, 24), &["trial 7 was not run"]);
 }
 
-/// Regression: the question before a proposal is skipped did not say that the last verdict becomes final.
-#[test]
-fn skipping_says_that_the_last_verdict_stays() {
+/// Trial 1 is proposed, and the verdict of trial 0 can still be taken back.
+fn proposed_after_a_verdict() -> Console {
     let mut console = Console::review(Mode::Review, Verdict::Accept);
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
     console.record(Record::Proposal(proposal(1, 0)));
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
     console.mode(Mode::Ready);
+    console
+}
+
+/// Regression: the question before a proposal is skipped did not say that the last verdict becomes final.
+#[test]
+fn skipping_says_that_the_last_verdict_stays() {
+    let mut console = proposed_after_a_verdict();
     console.press(&["n"]);
     let screen = console.screen(80, 24);
     assert_shows(
@@ -402,11 +408,7 @@ fn skipping_says_that_the_last_verdict_stays() {
 /// Regression: the question before quitting did not say that the last verdict becomes final.
 #[test]
 fn quitting_says_that_the_last_verdict_stays() {
-    let mut console = Console::review(Mode::Review, Verdict::Accept);
-    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
-    console.record(Record::Proposal(proposal(1, 0)));
-    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
-    console.mode(Mode::Ready);
+    let mut console = proposed_after_a_verdict();
     console.press(&["q"]);
     assert_shows(&console.screen(80, 24), &["Quit?", "The verdict of trial #0 then stays; Trials changes it"]);
 }

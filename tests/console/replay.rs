@@ -372,11 +372,11 @@ fn a_check_reads_the_whole_file_and_prints_what_is_lost() {
     };
     let cases: [(&str, Vec<u8>, &[&str]); 7] = [
         ("chunk", flipped(&[chunk + chunk_length / 2]), &["lost: 0.", "1 of ", "chunks are damaged", "s lost"]),
-        ("unguarded", zeroed(chunk + 24), &["1 chunks without a checksum"]),
+        ("unguarded", zeroed(chunk + 24), &["1 chunk without a checksum"]),
         ("list", flipped(&[list + 8]), &["bytes between its chunks are damaged; every message is there"]),
         ("summary", flipped(&[summary + 100]), &["its index is damaged"]),
         ("unguarded-summary", zeroed(footer + 16), &["its index is damaged"]),
-        ("attachment", flipped(&[attachment + attachment_length / 2]), &["1 attachments are damaged"]),
+        ("attachment", flipped(&[attachment + attachment_length / 2]), &["1 attachment is damaged"]),
         ("cut", whole[..whole.len() * 2 / 3].to_vec(), &["cut off"]),
     ];
     let text = program.text(&["replay", "--check", recording().to_str().unwrap()]);

@@ -376,7 +376,7 @@ fn a_chunk_without_a_checksum_is_decoded_before_it_is_believed() {
     let mut bytes = finished.clone();
     bytes[checksum.clone()].fill(0);
     let (played, damage) = play_damaged(&file(folder.path(), "unguarded.mcap", &bytes)).unwrap();
-    assert!(damage.unwrap().contains("1 chunks without a checksum"));
+    assert!(damage.unwrap().contains("1 chunk without a checksum"));
     assert_equal(&played, everything);
     // Flips anywhere in it, too: what cannot be decoded is left out, and nothing of it is played.
     let data = checksum.end + 4 + 4 + 8..chunk.end;

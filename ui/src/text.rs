@@ -22,9 +22,14 @@ pub fn remark(trial: &TrialRecord) -> String {
 }
 
 /// The bounds of a parameter as an operator types others.
+pub fn range(parameter: &ParameterInfo) -> String {
+    format!("{}..{}", six_digits(parameter.low), six_digits(parameter.high))
+}
+
+/// Both ways in which an operator can type the bounds of a parameter.
 pub fn range_example(parameter: &ParameterInfo) -> String {
     let [low, high] = [parameter.low, parameter.high].map(six_digits);
-    format!("{low}..{high} or {low},{high}")
+    format!("{} or {low},{high}", range(parameter))
 }
 
 /// Returns the tables of the session's study as lines of at most `width` characters, as `quadfrog report` prints them.

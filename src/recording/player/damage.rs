@@ -11,6 +11,7 @@ use crate::recording::error::RecordingError;
 use crate::recording::topic::Topic;
 use crate::recording::wire::DecodeError;
 use crate::recording::{frog, schema};
+use crate::trial::{counted, counted_are};
 
 /// Period of the ticks, ns.
 const TICK_NS: u64 = 1_000_000;
@@ -26,18 +27,16 @@ impl Player {
             (None, None) => None,
             (None, Some(trouble)) => Some(format!("a message cannot be read: {trouble}")),
             (Some(first), _) => Some(format!(
-                "{} of {} chunks are damaged and left out, {:.3} s ({})",
+                "{} of {} damaged and left out, {:.3} s ({})",
                 self.damaged.len(),
-                self.chunks.len(),
+                counted_are(self.chunks.len(), "chunk"),
                 self.lost_ns() as f64 / 1e9,
                 first.reason
             )),
         };
         let unguarded = (!self.unguarded.is_empty()).then(|| {
-            let count = self.unguarded.len();
-            format!(
-                "{count} chunks without a checksum are played as they were decoded; a wrong number in them is not seen"
-            )
+            let count = counted(self.unguarded.len(), "chunk");
+            format!("{count} without a checksum played as decoded; a wrong number there is not seen")
         });
         let parts: Vec<_> = self.container.cut.iter().chain(&chunks).chain(&unguarded).map(String::as_str).collect();
         (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
@@ -52,12 +51,12 @@ impl Player {
         let mut found = Vec::new();
         let bad = attachments.into_iter().filter(|span| self.container.read_attachment(*span).is_err()).count();
         if bad > 0 {
-            found.push(format!("{bad} attachments are damaged"));
+            found.push(format!("{} damaged", counted_are(bad, "attachment")));
         }
         let bad =
             metadata.into_iter().filter(|span| !matches!(self.container.read_metadata(*span), Ok(Some(_)))).count();
         if bad > 0 {
-            found.push(format!("{bad} metadata records are damaged"));
+            found.push(format!("{} damaged", counted_are(bad, "metadata record")));
         }
         if self.container.scanned && self.is_complete() {
             found.push("its index is damaged; its chunks were found one by one".into());

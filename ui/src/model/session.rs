@@ -135,6 +135,11 @@ impl SessionModel {
         })
     }
 
+    /// The parameter of that row with its present bounds.
+    pub fn present_parameter(&self, row: usize) -> Option<ParameterInfo> {
+        self.parameter(&self.info.parameters.get(row)?.name)
+    }
+
     /// The gain of that name with its allowed range.
     pub fn gain(&self, name: &str) -> Option<&ParameterInfo> {
         self.info.gains.iter().find(|gain| gain.name == name)

@@ -18,7 +18,7 @@ use super::arguments::{one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
 use super::output_file::write_file;
-use super::replay::is_in_progress;
+use super::replay::{is_written, lacks_its_end_alone};
 use super::table::{table_format, written_format};
 
 /// Viewer with a layout for recordings.
@@ -115,6 +115,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     if let Some(study) = files[0].parent().filter(|study| file.is_dir() && *study != file) {
         notice!("the newest study in it: {}", study.display());
     }
+    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
     let mut players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     players.sort_by_key(|player| player.start_utc_ns().saturating_add(player.first_ns()));
     let one_session = players.windows(2).all(|pair| pair[0].start_utc_ns() == pair[1].start_utc_ns());
@@ -147,7 +148,9 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
             written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,
         },
     }
-    let (in_progress, others): (Vec<_>, Vec<_>) = players.iter().partition(|player| is_in_progress(player));
+    let is_in_progress =
+        |player: &&Player| written.iter().any(|file| file.as_path() == player.path()) && lacks_its_end_alone(player);
+    let (in_progress, others): (Vec<_>, Vec<_>) = players.iter().partition(is_in_progress);
     for player in in_progress {
         let end_s = player.duration_ns() as f64 / 1e9;
         notice!("{}: a session still writes it; it is exported up to {end_s:.3} s", player.path().display());

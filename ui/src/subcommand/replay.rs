@@ -156,8 +156,8 @@ fn check(files: &[PathBuf]) -> Result<(), Failure> {
 }
 
 /// Whether a session that runs in its folder still writes a recording: the newest there. An older unfinished one is what a
-/// killed session left.
-fn is_written(file: &Path) -> bool {
+/// killed session left. To be asked before the file is read: a session that ends meanwhile gives it another name.
+pub fn is_written(file: &Path) -> bool {
     let folder = match file.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
@@ -168,10 +168,10 @@ fn is_written(file: &Path) -> bool {
         && matches!(running_session(folder), Ok(Some(_)))
 }
 
-/// Whether nothing is missing in a recording but the end that a session has not written yet.
-pub fn is_in_progress(player: &Player) -> bool {
+/// Whether nothing is missing in a recording but its end.
+pub fn lacks_its_end_alone(player: &Player) -> bool {
     let cut = player.cut().map(|cut| format!("{}{cut}", named_in(player.path())));
-    cut.is_some() && player.damage() == cut && is_written(player.path())
+    cut.is_some() && player.damage() == cut
 }
 
 /// Returns how a line about damage begins that is about `file`.
@@ -181,6 +181,7 @@ fn named_in(file: &Path) -> String {
 
 /// Returns whether a file is whole, or as whole as the session that still writes it has made it.
 fn check_file(file: &Path) -> Result<bool, Failure> {
+    let written = is_written(file);
     let mut player = Player::open(file)?;
     let (mut ticks, mut records) = (0_u64, 0_u64);
     for played in player.by_ref() {
@@ -201,7 +202,7 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         let [from_s, to_s] = [lost.from_ns, lost.to_ns].map(|time_ns| time_ns as f64 / 1e9);
         put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);
     }
-    if extras.is_empty() && is_in_progress(&player) {
+    if written && extras.is_empty() && lacks_its_end_alone(&player) {
         put_line!("  a session still writes it");
         return Ok(true);
     }

@@ -18,7 +18,7 @@ use crate::legal::{legal, may_request};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
 use crate::model::dialog::{Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
-use crate::text::report;
+use crate::text::{range, report};
 use crate::theme::Background;
 
 /// Time within which the same verdict is a key that was pressed twice: another trial cannot wait so soon.
@@ -267,9 +267,8 @@ fn fix(model: &mut Model) -> Vec<Effect> {
 }
 
 fn bounds(model: &mut Model) {
-    if let Some(info) = model.override_parameter().and_then(|info| model.session.parameter(&info.name)) {
-        let text = format!("{}..{}", six_digits(info.low), six_digits(info.high));
-        open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &text));
+    if let Some(info) = model.session.present_parameter(model.override_row) {
+        open(model, Dialog::field(Purpose::Bounds { parameter: model.override_row }, &range(&info)));
     }
 }
 

@@ -21,6 +21,7 @@ use tui_input::Input;
 
 use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
+use super::questions::last_verdict_stays;
 use super::{log, questions, queue};
 use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
@@ -310,12 +311,12 @@ fn field(
     let hint = match purpose {
         Purpose::HandValue(trial) => by_hand(model, trial),
         Purpose::Bounds { parameter } => {
-            let info = model.session.info.parameters.get(parameter);
-            let searched = info.and_then(|info| model.session.searched(&info.name));
+            let info = model.session.present_parameter(parameter);
+            let searched = info.as_ref().and_then(|info| model.session.searched(&info.name));
             let allowed = searched.map_or(String::new(), |p| {
                 format!("; safety.toml allows {} to {}", six_digits(p.least), six_digits(p.most))
             });
-            let example = info.map_or(String::new(), range_example);
+            let example = info.as_ref().map_or(String::new(), range_example);
             format!("write it as {example}, without a space{allowed}; past trials stay")
         }
         Purpose::Fix { parameter, .. } => {
@@ -327,15 +328,9 @@ fn field(
                 least if least > 0 => format!("; to compare them takes {}", counted(least, "repeat")),
                 _ => String::new(),
             };
-            let last = match model.session.undoable() {
-                Some(trial) => {
-                    let undo = model.keymap.key(Action::Undo);
-                    format!("; the verdict of trial {trial} then stays: {undo} does not take it back any longer")
-                }
-                None => String::new(),
-            };
+            let last = last_verdict_stays(model).map_or(String::new(), |sentence| format!(" {sentence}"));
             format!(
-                "the best points run again until one leads{needed}; each repeat is approved, and does not count for the budget{last}"
+                "The best points run again until one leads{needed}; each repeat is approved, and does not count for the budget.{last}"
             )
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),

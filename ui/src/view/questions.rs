@@ -27,10 +27,10 @@ fn answers_or(default: &str, theme: &Theme, key: &str, text: &str) -> Line<'stat
 }
 
 /// The sentence that the last verdict becomes final; none where it is final already.
-fn last_verdict_stays(model: &Model) -> Option<Line<'static>> {
+pub fn last_verdict_stays(model: &Model) -> Option<String> {
     let undo = model.keymap.key(Action::Undo);
     let text = |trial| format!("The verdict of trial #{trial} then stays: {undo} does not take it back any longer.");
-    model.session.undoable().map(text).map(Line::from)
+    model.session.undoable().map(text)
 }
 
 pub fn take_control(model: &Model) -> Vec<Line<'static>> {
@@ -156,7 +156,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let text =
                 format!("Trial #{trial} will not be run; the sampler does not see it. Another proposal follows.");
             let mut lines = vec![Line::from(text)];
-            lines.extend(last_verdict_stays(model));
+            lines.extend(last_verdict_stays(model).map(Line::from));
             lines.extend([Line::default(), answers(&model.theme, "y", "skip")]);
             ("Skip the proposal?", lines)
         }
@@ -229,7 +229,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
         Question::EndRepeats => {
             let left = counted(model.session.confirming().unwrap_or(0) as usize, "repeat");
             let mut lines = vec![Line::from(format!("{left} will not be run: the best is not confirmed."))];
-            lines.extend(last_verdict_stays(model));
+            lines.extend(last_verdict_stays(model).map(Line::from));
             lines.extend([Line::default(), answers(&model.theme, "y", "end them")]);
             ("End the repeats?", lines)
         }

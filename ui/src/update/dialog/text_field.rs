@@ -229,14 +229,14 @@ fn count(text: &str, things: &str) -> Result<u32, String> {
 
 /// Bounds typed as `low..high` or `low,high`, checked as far as the screen can know; the session checks all of it again.
 fn bounds(model: &Model, parameter: usize, text: &str) -> Result<OperatorRequest, String> {
-    let info = model.session.info.parameters.get(parameter).ok_or("there is no such parameter")?;
+    let info = model.session.present_parameter(parameter).ok_or("there is no such parameter")?;
     let (name, unit) = (&info.name, &info.unit);
     let number = |text: &str| text.trim().replace(',', ".").parse::<f64>().ok().filter(|value| value.is_finite());
     // A comma separates two numbers, or the decimals of each where `..` separates them.
     let parts = text.split_once("..").or_else(|| text.split_once(',').filter(|(_, high)| !high.contains(',')));
     let ends = parts.and_then(|(low, high)| Some((number(low)?, number(high)?)));
     let Some((low, high)) = ends else {
-        return Err(format!("`{text}` is no range; write it as {}", range_example(info)));
+        return Err(format!("`{text}` is no range; write it as {}", range_example(&info)));
     };
     if low >= high {
         return Err(format!("{low} is not below {high}"));
