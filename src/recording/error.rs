@@ -13,7 +13,7 @@ pub enum RecordingError {
     Missing { path: PathBuf },
     #[error("{}: exists already and is not overwritten; move it away or choose another name", path.display())]
     Exists { path: PathBuf },
-    #[error("{}: a recording's name must end in .mcap", path.display())]
+    #[error("{}: the name of a finished recording must end in .mcap", path.display())]
     Name { path: PathBuf },
     #[error("{}: not a regular file; name a recording, *.mcap or *.mcap.part, that can be read from any place", path.display())]
     NotAFile { path: PathBuf },

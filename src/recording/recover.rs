@@ -47,6 +47,9 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
 /// # Errors
 /// Those of [`recover`], and when the name does not end in `.mcap`.
 pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingError> {
+    if !path.exists() {
+        return Err(RecordingError::Missing { path: path.into() });
+    }
     if target.extension().is_none_or(|extension| extension != "mcap") {
         return Err(RecordingError::Name { path: target.into() });
     }

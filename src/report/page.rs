@@ -5,7 +5,7 @@
 //!   Section { heading, blocks }
 //!     Block = Paragraph | Equation | Quote | Table | Figure | Folded
 //!       Table { caption, columns: [Column { name, unit, text }], rows: [[Cell]] }
-//!         Cell = Text | Number { value, digits } | Missing
+//!         Cell = Text | Number { value, digits, mark } | Missing
 //! ```
 //!
 //! Texts are plain: no markup, any characters. `src/report/html.rs` and `src/report/text.rs` escape them.
@@ -152,9 +152,9 @@ impl TableColumn {
 pub enum Cell {
     /// A text.
     Text(String),
-    /// A number, shown with so many decimal places; one that is not finite is shown as missing.
+    /// A number, shown with so many decimal places and a mark behind it, often none; one that is not finite is shown as missing.
     #[expect(missing_docs, reason = "the names say it")]
-    Number { value: f64, digits: usize },
+    Number { value: f64, digits: usize, mark: &'static str },
     /// No value.
     Missing,
 }
@@ -167,27 +167,36 @@ impl Cell {
 
     /// A number.
     pub fn number(value: f64, digits: usize) -> Cell {
-        Cell::Number { value, digits }
+        Cell::optional(Some(value), digits)
     }
 
     /// A count.
     pub fn count(value: usize) -> Cell {
-        Cell::Number { value: value as f64, digits: 0 }
+        Cell::number(value as f64, 0)
     }
 
     /// A number, or none.
     pub fn optional(value: Option<f64>, digits: usize) -> Cell {
-        value.map_or(Cell::Missing, |value| Cell::Number { value, digits })
+        value.map_or(Cell::Missing, |value| Cell::Number { value, digits, mark: "" })
+    }
+
+    /// The same number with a mark behind it.
+    pub fn marked(mut self, with: &'static str) -> Cell {
+        if let Cell::Number { mark, .. } = &mut self {
+            *mark = with;
+        }
+        self
     }
 
     /// Returns the cell as it is shown; `-` where a value is missing.
     pub fn shown(&self) -> String {
         match self {
             Cell::Text(text) => text.clone(),
-            Cell::Number { value, digits } if value.is_finite() => {
+            Cell::Number { value, digits, mark } if value.is_finite() => {
                 let text = format!("{value:.digits$}");
                 let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
-                if zero { text.trim_start_matches('-').to_owned() } else { text }
+                let space = if mark.is_empty() { "" } else { " " };
+                format!("{}{space}{mark}", if zero { text.trim_start_matches('-') } else { &text })
             }
             Cell::Number { .. } | Cell::Missing => "-".to_owned(),
         }
@@ -198,7 +207,7 @@ impl Serialize for Cell {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Cell::Text(text) => serializer.serialize_str(text),
-            Cell::Number { value, digits: 0 } if value.abs() < 1e15 && value.fract() == 0.0 => {
+            Cell::Number { value, digits: 0, .. } if value.abs() < 1e15 && value.fract() == 0.0 => {
                 serializer.serialize_i64(*value as i64)
             }
             Cell::Number { value, .. } => serializer.serialize_f64(*value),

@@ -109,18 +109,20 @@ impl ReportedStudy {
 
     /// Best accepted value after each trial that counts; not a number before the first accepted trial.
     pub fn best_so_far(&self) -> Vec<f64> {
-        let mut best = f64::NAN;
-        let values = self.counted().map(|row| row.value.filter(|_| row.verdict == Some(Verdict::Accept)));
-        values
-            .map(|value| {
-                if let Some(value) = value
-                    && (best.is_nan() || self.direction.best_first(value, best).is_lt())
-                {
-                    best = value;
-                }
-                best
-            })
-            .collect()
+        self.best_so_far_rows().map(|best| best.and_then(|row| row.value).unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The accepted trial of the best value after each trial that counts; none before the first accepted one.
+    pub fn best_so_far_rows(&self) -> impl Iterator<Item = Option<&TrialRecord>> {
+        let mut best: Option<(f64, &TrialRecord)> = None;
+        self.counted().map(move |row| {
+            if let Some(value) = row.value.filter(|_| row.verdict == Some(Verdict::Accept))
+                && best.is_none_or(|(most, _)| self.direction.best_first(value, most).is_lt())
+            {
+                best = Some((value, row));
+            }
+            best.map(|(_, row)| row)
+        })
     }
 
     /// The force profile of a trial.

@@ -9,6 +9,9 @@ use crate::trial::{Task, TrialRecord, Verdict, counted as in_words, parameter_un
 /// Numbers of trials at which the best so far is listed.
 const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
 
+/// Mark of a value that was measured by hand, as in the console.
+const BY_HAND: &str = "h";
+
 /// Decimal places of a parameter: about four significant digits.
 fn digits(low: f64, high: f64) -> usize {
     let most = low.abs().max(high.abs());
@@ -21,6 +24,16 @@ fn parameter_columns(study: &ReportedStudy) -> impl Iterator<Item = Column> {
 
 fn parameter_cells(study: &ReportedStudy, row: &TrialRecord) -> impl Iterator<Item = Cell> {
     study.parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)))
+}
+
+/// The value of a trial, marked where it was measured by hand.
+fn value(row: &TrialRecord) -> Cell {
+    Cell::optional(row.value, 3).marked(if row.counts_by_hand() { BY_HAND } else { "" })
+}
+
+/// Returns the end of a caption that explains the mark, where one of the trials has it.
+fn explained<'a>(mut rows: impl Iterator<Item = &'a TrialRecord>) -> String {
+    if rows.any(TrialRecord::counts_by_hand) { format!(" {BY_HAND}: measured by hand.") } else { String::new() }
 }
 
 /// Studies with counts of their trials and their best values. The unit is in the header where all have the same one: the
@@ -38,8 +51,9 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
     let waiting = if waiting > 0 { format!(", {waiting} without a verdict") } else { String::new() };
     let caption = format!(
         "Studies. {}, {counted} counted{waiting}: repeats that confirm the best and void trials do not count. A proposal that \
-         was not run is no trial.",
-        in_words(trials, "trial")
+         was not run is no trial.{}",
+        in_words(trials, "trial"),
+        explained(studies.iter().filter_map(ReportedStudy::best_row))
     );
     let mut table = Table::new(caption, columns);
     for study in studies {
@@ -53,7 +67,7 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
             counted(Verdict::Fall),
             Cell::count(repeats.count()),
             Cell::count(study.with(Verdict::Void).count()),
-            Cell::optional(best.and_then(|row| row.value), 3),
+            best.map_or(Cell::Missing, value),
         ];
         let unit = several_units.then(|| Cell::text(study.unit.clone()));
         let trial = best.map_or(Cell::Missing, |row| Cell::count(row.trial as usize));
@@ -75,7 +89,10 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
     at.push(longest);
     let columns = [Column::text("task"), Column::number("studies", "")].into_iter();
     let columns = columns.chain(at.iter().map(|count| Column::number(in_words(*count, "trial"), "")));
-    let caption = "Best value so far, mean and standard deviation over the studies, in the unit of J.";
+    let caption = format!(
+        "Best value so far, mean and standard deviation over the studies, in the unit of J.{}",
+        explained(groups.iter().flatten().flat_map(|study| study.best_so_far_rows()).flatten())
+    );
     let mut table = Table::new(caption, columns);
     for group in groups {
         let curves: Vec<Vec<f64>> = group.iter().map(|study| study.best_so_far()).collect();
@@ -85,7 +102,10 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
             values.filter(|values| !values.is_empty()).map_or(Cell::Missing, |values| {
                 let (mean, deviation) = mean_and_deviation(&values);
                 let spread = if values.len() > 1 { format!(" +- {deviation:.3}") } else { String::new() };
-                Cell::text(format!("{mean:.3}{spread}"))
+                let mut best = group.iter().filter_map(|study| study.best_so_far_rows().nth(*count - 1).flatten());
+                let by_hand = best.any(TrialRecord::counts_by_hand);
+                let mark = if by_hand { format!(" {BY_HAND}") } else { String::new() };
+                Cell::text(format!("{mean:.3}{spread}{mark}"))
             })
         };
         let name = group[0].task.map_or_else(|| group[0].name.clone(), |task| task.name().to_owned());
@@ -152,12 +172,13 @@ pub fn best(group: &[&ReportedStudy]) -> Table {
     } else {
         ""
     };
-    let mut table = Table::new(format!("Best trial of each study, {name}.{chosen}"), columns);
+    let by_hand = explained(group.iter().filter_map(|study| study.best_row()));
+    let mut table = Table::new(format!("Best trial of each study, {name}.{chosen}{by_hand}"), columns);
     for study in group {
         let Some(row) = study.best_row() else { continue };
         let own =
             group[0].parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)));
-        let cells = [Cell::text(study.label()), Cell::count(row.trial as usize), Cell::optional(row.value, 3)];
+        let cells = [Cell::text(study.label()), Cell::count(row.trial as usize), value(row)];
         let best = study.model_best;
         let model = [best.map(|best| best.value), best.map(|best| best.deviation)];
         let model = model.into_iter().filter(|_| by_model).map(|value| Cell::optional(value, 3));

@@ -144,7 +144,9 @@ impl Landing {
     fn of(ticks: &[Tick], airborne: &[AirborneTicks]) -> Landing {
         let impulse_end = ticks.iter().rposition(|tick| tick.phase == Phase::Impulse).map_or(0, |last| last + 1);
         let mut landing = Landing::default();
-        for flight in airborne.iter().filter(|flight| flight.end > impulse_end) {
+        // A trial that was stopped within the impulse may end in the air.
+        let counts = |flight: &&AirborneTicks| flight.end > impulse_end || flight.end == ticks.len();
+        for flight in airborne.iter().filter(counts) {
             let shortest_s = if landing.flights == 0 { SHORTEST_FLIGHT_S } else { SHORTEST_BOUNCE_S };
             if (flight.len() as u32) < ticks_in(shortest_s) {
                 continue;

@@ -412,3 +412,18 @@ fn quitting_says_that_the_last_verdict_stays() {
     console.press(&["q"]);
     assert_shows(&console.screen(80, 24), &["Quit?", "The verdict of trial #0 then stays; Trials changes it"]);
 }
+
+/// Regression: a void trial covered an accepted one that came down at the same place.
+#[test]
+fn a_void_trial_covers_no_accepted_one_among_the_landings() {
+    let mut console = Console::ready();
+    for (number, verdict) in [(0, Verdict::Accept), (1, Verdict::Accept), (2, Verdict::Void)] {
+        let mut row = trial(number, Some(verdict), None);
+        row.measured.as_mut().expect("measured").dx_m = if number == 1 { 0.9 } else { 0.4 };
+        console.record(Record::Trial(row));
+    }
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    let accepted = |line: &str| line.trim_end().ends_with(" o");
+    assert!(screen.lines().any(accepted), "{screen}");
+}

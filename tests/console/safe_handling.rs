@@ -210,6 +210,31 @@ fn a_recording_is_recovered_into_the_file_that_is_given() {
     assert!(program.path("cut.mcap").exists());
 }
 
+/// Regression: a whole recording was copied, with the words that nothing needs it any more; its study does not read the copy.
+#[test]
+fn a_whole_recording_is_not_recovered_and_a_damaged_one_names_how_its_study_reads_the_new_file() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let study = program.study("recordings");
+    let [file, recovered] = ["session.mcap", "session.recovered.mcap"].map(|name| study.join(name));
+    let given = file.to_str().unwrap();
+    assert_shows(&program.refused(&["recover", given]), &["session.mcap: it is whole; there is nothing to recover"]);
+    assert!(!recovered.exists());
+    let mut bytes = fs::read(&file).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0xff;
+    fs::write(&file, bytes).unwrap();
+    let printed = program.text(&["recover", given]);
+    assert_shows(&printed, &["session.mcap is unchanged.", "once you have moved", "renamed the new file to"]);
+    fs::rename(&file, program.path("damaged.mcap")).unwrap();
+    fs::rename(&recovered, &file).unwrap();
+    assert_shows(&program.text(&["replay", "--check", study.to_str().unwrap()]), &["whole"]);
+    // Regression: of a name without a file the ending was refused.
+    let missing = study.join("nothing.part");
+    let refused = program.refused(&["recover", missing.to_str().unwrap()]);
+    assert_shows(&refused, &["nothing.part: there is no such file"]);
+}
+
 #[test]
 fn a_recovery_that_does_not_fit_names_its_cause_and_leaves_nothing() {
     let program = Program::new();

@@ -118,6 +118,13 @@ fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
     assert!(shown.contains("accept, J by hand"), "{shown}");
     let report = quadfrog(folder.path(), &["report", study]);
     assert!(report.contains("accept, J by hand, best"), "{report}");
+    // Regression: the tables of the studies and of their best trials showed a value by hand as a measured one.
+    assert_eq!(report.matches("0.400 h").count(), 3, "{report}");
+    assert_eq!(
+        report.split_whitespace().collect::<Vec<_>>().join(" ").matches("h: measured by hand.").count(),
+        3,
+        "{report}"
+    );
 }
 
 /// Regression: under automatic approval an edit in the table of a finished study made the robot arm itself and jump.

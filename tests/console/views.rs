@@ -718,6 +718,23 @@ fn the_details_and_the_exported_table_hold_touchdown_bounces_and_every_jump() {
     assert!(line.contains(",3,0.75,0.01,0.02,") && line.contains("\"\"time_s\"\":1.0"), "{line}");
 }
 
+/// Regression: of a trial that was stopped in the air the details said that its feet were down.
+#[test]
+fn the_details_of_a_trial_that_was_stopped_in_the_air_name_no_feet_on_the_ground() {
+    let details = |suggested: Verdict, flights: u32| {
+        let mut console = Console::ready();
+        let mut row = trial(0, Some(Verdict::Void), Some(suggested));
+        row.measured.as_mut().unwrap().flights = flights;
+        console.record(Record::Trial(row));
+        console.press(&["2", "Enter"]);
+        console.screen(160, 50)
+    };
+    assert_shows(&details(Verdict::Void, 1), &["none: the trial ended in the air"]);
+    // A record of an earlier version, which counted no flight of such a trial.
+    assert!(!details(Verdict::Void, 0).contains("touchdown"));
+    assert_shows(&details(Verdict::Accept, 0), &["none after the impulse: the feet were down before its end"]);
+}
+
 /// Regression: a trial that was cancelled in its countdown was compared as a jump, without a line in any chart.
 #[test]
 fn a_trial_that_ended_before_its_impulse_is_not_laid_under_the_charts() {

@@ -479,6 +479,20 @@ fn a_trial_interrupted_in_mid_jump_is_void_and_comes_again() {
     assert!(again.trial > spec.trial);
 }
 
+/// Regression: the cause of a trial that was stopped, after which the program was killed, said no longer that STOP was pressed.
+#[test]
+fn a_trial_that_was_stopped_before_the_program_ended_says_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let spec = run(&mut experiment, TrialEnd::Stopped);
+    experiment.keep_measurement().unwrap();
+    drop(experiment);
+    let experiment = open(folder.path());
+    let row = experiment.row(spec.trial).unwrap();
+    assert_eq!(row.verdict, Some(Verdict::Void));
+    assert_eq!(row.cause, "STOP was pressed; interrupted: the program ended before the verdict");
+}
+
 /// Killed between the verdict and its telling, a re-run is not forgotten; killed once more, it does not come twice.
 #[test]
 fn a_rerun_survives_every_moment_of_a_kill_and_comes_once() {

@@ -73,6 +73,9 @@ fn a_flight_that_ends_in_the_impulse_is_not_after_it() {
 fn a_robot_that_is_still_in_the_air_at_the_end_has_no_touchdown() {
     let found = measured(&[IMPULSE, FLIGHT]);
     assert!(found.flights == 1 && found.touchdown.is_none(), "{found:?}");
+    // Regression: of a robot that was stopped within the impulse, in the air, no flight was counted.
+    let found = measured(&[IMPULSE, (Phase::Impulse, false, 0.1)]);
+    assert!(found.flights == 1 && found.touchdown.is_none(), "{found:?}");
 }
 
 /// Each rule: the value, and the suggested verdict with its cause.

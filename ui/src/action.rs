@@ -210,7 +210,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
         row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts, ~ in Trials; a second one: compare both"),
 
-        row(A::Sort, "sort", &["s"], G::Tables, "sort by the next column"),
+        row(A::Sort, "sort", &["s"], G::Tables, "sort by the next: value, verdict, others from the left"),
         row(A::Reverse, "reverse", &["S"], G::Tables, "reverse the order"),
         row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level"),
         row(A::Columns, "columns", &["x"], G::Tables, "choose the columns"),

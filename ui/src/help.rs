@@ -12,14 +12,15 @@ use crate::theme::Role;
 /// Columns before the text of an action.
 pub const INDENT: usize = 13;
 
-/// The keys by group: in a replay those of the replay first and none that commands a robot, and while a trial waits for its verdict
-/// those of the verdict.
+/// The keys by group: in a replay those of the replay first and none that commands a robot, in the console of an observer STOP, and
+/// while a trial waits for its verdict those of the verdict.
 pub fn lines(model: &Model) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut lines = Vec::new();
     let mut groups = ActionGroup::VARIANTS.to_vec();
     let first = match (&model.replay, model.session.under_review()) {
-        (Some(_), _) => Some(ActionGroup::Replay),
+        (Some(replay), _) if replay.observer.is_none() => Some(ActionGroup::Replay),
+        (Some(_), _) => Some(ActionGroup::Robot),
         (None, Some(_)) => Some(ActionGroup::Verdict),
         (None, None) => None,
     };

@@ -70,7 +70,9 @@ pub fn legal(action: Action, model: &Model) -> Legality {
             require(known, "no jump has been recorded yet")
         }
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
-            require(model.view == View::Trials, "only in the view Trials")
+            let reason =
+                if action == A::Copy { "it copies a row in the view Trials" } else { "only in the view Trials" };
+            require(model.view == View::Trials, reason)
         }
         A::Filter | A::Search => {
             require(matches!(model.view, View::Trials | View::Log), "only in the views Trials and Log")?;

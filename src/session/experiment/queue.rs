@@ -93,7 +93,13 @@ impl TrialQueue {
 fn close_all(study: &mut Study, trials: &[Trial], cause: &str) -> Result<Vec<String>, StudyError> {
     let mut log = Vec::new();
     for trial in trials {
-        let (outcome, last, result) = match TrialAttributes::of(trial).outcome() {
+        let left = TrialAttributes::of(trial);
+        // The reason for which a trial was void before its program ended, as a pressed STOP, is told first.
+        let cause = match left.cause.as_deref().filter(|before| left.suggested.is_some() && !before.is_empty()) {
+            Some(before) => &format!("{before}; {cause}"),
+            None => cause,
+        };
+        let (outcome, last, result) = match left.outcome() {
             Some(outcome) => (outcome, Attributes::new(), "judged before the interruption: it counts"),
             // Queued again by the caller, or by the next session if this program is killed before.
             None => {

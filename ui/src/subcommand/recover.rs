@@ -1,11 +1,12 @@
 //! `quadfrog recover`: repairs an incomplete recording.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EngineError, running_session};
+use quadfrog::recording::player::Player;
 use quadfrog::recording::{RecordingError, recover};
 use quadfrog::trial::counted;
 
@@ -29,6 +30,10 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
             format!("{}: there is no such file; give {}, which was not finished", file.display(), part.display());
         return Err(Failure::input(text));
     }
+    let is_unfinished = file.extension().is_some_and(|extension| extension == "part");
+    if !is_unfinished && is_whole(file) {
+        return Err(Failure::input(format!("{}: it is whole; there is nothing to recover", file.display())));
+    }
     let recovered = match output {
         Some(output) => recover::recover_to(file, output),
         None => recover::recover(file),
@@ -44,8 +49,27 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
         Some(lost) => put_line!("The recording is not complete: {lost}."),
         None => put_line!("Nothing was lost."),
     }
-    put_line!("{} is unchanged; nothing needs it any more once you have looked at the new file.", file.display());
+    // Of a study only the files with the names that its sessions give are read.
+    let read = if is_unfinished { file.with_extension("") } else { file.clone() };
+    put_line!("{} is unchanged.", file.display());
+    if recovered.path == read {
+        put_line!("Its study reads the new file in its place.");
+    } else if is_unfinished {
+        put_line!("Its study reads the new file once that is {}.", read.display());
+    } else {
+        put_line!(
+            "Its study reads the new file once you have moved {0} away and renamed the new file to {0}.",
+            read.display()
+        );
+    }
     Ok(())
+}
+
+/// Whether every message, attachment and index of a finished recording can be read.
+fn is_whole(file: &Path) -> bool {
+    let Ok(mut player) = Player::open(file) else { return false };
+    player.by_ref().for_each(drop);
+    player.check_extras().is_ok_and(|damaged| damaged.is_empty()) && player.damage().is_none()
 }
 
 /// Refuses a recording that a session still writes: the session needs the name of the finished file.

@@ -2,7 +2,7 @@
 
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
 use quadfrog::trial::{
-    Displacement, ExpectedResult, JudgedBy, JumpRow, Overrides, TrialRecord, four_digits, six_digits,
+    Displacement, ExpectedResult, JudgedBy, JumpRow, Overrides, TrialRecord, Verdict, four_digits, six_digits,
 };
 
 use super::draw::{clock, falls_near, with_deviation};
@@ -105,7 +105,9 @@ pub fn details(
                 "touchdown",
                 format!("at {time_s:.3} s, {dx_m:+.4} m forward, {dy_m:+.4} m left, turned {dyaw_rad:+.4} rad"),
             ),
-            None if m.air_s > 0.0 && m.flights == 0 => {
+            None if m.flights > 0 => row("touchdown", "none: the trial ended in the air".to_owned()),
+            // Of a trial that was stopped within the impulse an earlier version has counted no flight.
+            None if m.air_s > 0.0 && trial.suggested != Some(Verdict::Void) => {
                 row("touchdown", "none after the impulse: the feet were down before its end".to_owned());
             }
             None => {}

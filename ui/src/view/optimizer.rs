@@ -178,7 +178,8 @@ fn render_landings(frame: &mut Frame, area: Rect, session: &SessionModel, theme:
     buffer.set_string(x, y, "+", theme.style(Role::Quiet));
     let best = session.trials.best().map(|trial| trial.trial);
     let mut landings: Vec<_> = landed().collect();
-    landings.sort_by_key(|(trial, _)| best == Some(trial.trial));
+    // The later covers the earlier: a void trial tells least, the best most.
+    landings.sort_by_key(|(trial, _)| (best == Some(trial.trial), trial.verdict != Some(Verdict::Void)));
     for (trial, m) in landings {
         let (symbol, role) = sign(trial.verdict);
         let symbol = if best == Some(trial.trial) { "*" } else { symbol };

@@ -37,8 +37,12 @@ fn of_row(model: &Model) -> Vec<(String, String)> {
     let open = if goes_there { "go to it" } else { "open" };
     let mut keys = vec![(key(Action::Open), open.to_owned())];
     if recorded || model.history.jump(trial).is_some() {
-        let same = model.live.comparison.is_none() && model.live.ghost == Some(trial);
-        keys.push((key(Action::Ghost), if same { "clear" } else { "compare" }.to_owned()));
+        let text = match model.live.ghost {
+            _ if model.live.comparison.is_some() => "compare anew",
+            Some(laid) if laid == trial => "clear",
+            _ => "compare",
+        };
+        keys.push((key(Action::Ghost), text.to_owned()));
     }
     // The step itself names the verdicts of a trial that waits.
     if model.session.under_review().is_some() {
