@@ -23,7 +23,7 @@ pub use ground::TrialGround;
 pub use guard::{GUARD, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};
 pub use observers::{
     FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, STOP_BY, SessionFacts, SessionNews,
-    find_sessions,
+    WHO_WATCHES, find_sessions,
 };
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use super::guard::{Guard, GuardState};
-use super::observers::SessionNews;
+use super::observers::{STOP_BY, SessionNews};
 use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
@@ -40,6 +40,13 @@ pub fn run(
 ) -> (Supervisor, Option<Guard>) {
     let mut guard_state = GuardState::Answering;
     loop {
+        // Before the trial that an observer has stopped is measured.
+        for (level, message) in news.try_iter() {
+            if let Some(observer) = message.strip_prefix(STOP_BY) {
+                supervisor.stopped_by(observer.to_owned(), clock.now_ns());
+            }
+            supervisor.log(level, message, clock.now_ns());
+        }
         supervisor.poll(clock.now_ns());
         if let Some(guard) = &mut guard {
             let before = std::mem::replace(&mut guard_state, guard.state());
@@ -53,9 +60,6 @@ pub fn run(
             let message =
                 format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
             supervisor.log(LogLevel::Warning, message, clock.now_ns());
-        }
-        for (level, message) in news.try_iter() {
-            supervisor.log(level, message, clock.now_ns());
         }
         // A real robot is taken control of with a key: another program may command it.
         if supervisor.mode() == Mode::Observe && (!hardware || supervisor.control_wanted()) {

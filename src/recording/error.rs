@@ -17,8 +17,12 @@ pub enum RecordingError {
     Name { path: PathBuf },
     #[error("{}: not a regular file; name a recording, *.mcap or *.mcap.part, that can be read from any place", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: no recording there: no session.mcap in it or in the folders below it; name a file or a study's folder", path.display())]
-    NoRecording { path: PathBuf },
+    #[error(
+        "{}: no recording there: no session.mcap in it or in a folder directly below it; name a file or a study's folder{}",
+        path.display(),
+        deeper.as_ref().map_or(String::new(), |deeper| format!(", for example {}", deeper.display()))
+    )]
+    NoRecording { path: PathBuf, deeper: Option<PathBuf> },
     #[error("{}: not of the study of {}: {reason}; replay them one by one", path.display(), first.display())]
     OtherStudy { path: PathBuf, first: PathBuf, reason: String },
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]

@@ -30,8 +30,7 @@ pub fn next_recording(folder: &Path, last: Option<&Path>) -> Option<PathBuf> {
 /// ending `.part` only the finished one: the other was recovered.
 pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
-    let mut files: Vec<(u32, bool, PathBuf)> = entries
+    let mut files: Vec<(u32, bool, PathBuf)> = entries(folder)
         .filter_map(|path| Some((number(&path)?, path.extension().is_some_and(|end| end == "part"), path)))
         .collect();
     files.sort();
@@ -61,9 +60,17 @@ pub fn recordings_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if !own.is_empty() {
         return Ok(own);
     }
-    let entries = std::fs::read_dir(path).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
-    let newest = entries.map(|folder| recordings_in(&folder)).max_by_key(|files| changed(files));
-    newest.filter(|files| !files.is_empty()).ok_or_else(|| RecordingError::NoRecording { path: path.into() })
+    let newest = entries(path).map(|folder| recordings_in(&folder)).max_by_key(|files| changed(files));
+    newest.filter(|files| !files.is_empty()).ok_or_else(|| {
+        let studies = entries(path).flat_map(|folder| entries(&folder).collect::<Vec<_>>());
+        let deeper = studies.filter(|study| !recordings_in(study).is_empty()).min();
+        RecordingError::NoRecording { path: path.into(), deeper }
+    })
+}
+
+/// The paths in a folder; none of one that cannot be read.
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()))
 }
 
 /// Returns the time of the last change of the files, with the first name to decide between equal ones.

@@ -8,7 +8,7 @@ use super::player::{LostPart, Marker, MarkerKind, Played, Player};
 use super::record::{Record, SessionInfo, StageRecord, Stamped};
 use super::session_files::recordings_in;
 use crate::telemetry::Mode;
-use crate::trial::{ExperimentStage, Overrides, TrialRecord};
+use crate::trial::{ExperimentStage, Overrides, TrialRecord, Verdict};
 
 /// Longest pause between two files that is played in its length, ns; of a longer one 1 s is left.
 const LONGEST_PAUSE_NS: u64 = 10_000_000_000;
@@ -90,7 +90,7 @@ impl Timeline {
         let mut players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>()?;
         players.sort_by_key(begin_utc_ns);
         let mut players = players.into_iter();
-        let first = players.next().ok_or_else(|| RecordingError::NoRecording { path: PathBuf::new() })?;
+        let first = players.next().ok_or_else(|| RecordingError::NoRecording { path: PathBuf::new(), deeper: None })?;
         let mut timeline = Timeline::from(first);
         for player in players {
             timeline.append(player)?;
@@ -259,6 +259,17 @@ impl Timeline {
     /// Returns the newest row of each trial.
     pub fn rows(&self) -> BTreeMap<u32, TrialRecord> {
         rows_of(self.parts.iter().flat_map(|part| part.player.events()))
+    }
+
+    /// Returns the trials that fell, tripped a limit or were judged a fall at any time, whatever their verdict is now.
+    pub fn falls(&self) -> BTreeSet<u32> {
+        let events = self.parts.iter().flat_map(|part| part.player.events());
+        let fell = |row: &TrialRecord| [row.verdict, row.suggested].contains(&Some(Verdict::Fall));
+        let falls = events.filter_map(|event| match &event.record {
+            Record::Trial(row) => fell(row).then_some(row.trial),
+            _ => None,
+        });
+        falls.collect()
     }
 
     /// Returns the values that the operator has set in place of proposed ones.

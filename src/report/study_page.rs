@@ -4,7 +4,7 @@ use super::page::{Block, Page, Section};
 use super::study::{ReportedStudy, TrialChoice, by_task};
 use super::study_figures::{DrawnTrial, TaskStudies, drawn};
 use super::study_tables::{self as tables, title};
-use super::table;
+use super::table::{self, changed_bounds};
 use crate::optimize::ask::Direction;
 use crate::trial::{ParameterInfo, Task, counted, six_digits};
 
@@ -207,7 +207,7 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
                 section.paragraph(format!("{}:", title(study)));
                 section.blocks.push(Block::Table(table));
             }
-            None => section.paragraph(format!("{}: the defaults.", title(study))),
+            None => section.paragraph(format!("{}: its configuration files have the defaults.", title(study))),
         }
         for (name, text) in &study.configuration {
             let summary = format!("{name}, {}", title(study));
@@ -220,7 +220,10 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
 
 /// The present bounds, which the operator may have changed during the study.
 fn bounds(study: &ReportedStudy) -> String {
-    let range = |p: &ParameterInfo| format!("{} {} to {} {}", p.name, six_digits(p.low), six_digits(p.high), p.unit);
+    let range = |p: &ParameterInfo| {
+        let changed = changed_bounds(p, &study.rows).map_or(String::new(), |changed| format!(" ({changed})"));
+        format!("{} {} to {} {}{changed}", p.name, six_digits(p.low), six_digits(p.high), p.unit)
+    };
     let ranges: Vec<String> = study.parameters.iter().map(range).collect();
     format!("{}: searched last over {}.", title(study), ranges.join(", "))
 }

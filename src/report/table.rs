@@ -7,7 +7,7 @@ use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
 use crate::trial::{
     JudgedBy, JumpRow, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord, Verdict,
-    counted, four_digits, parameter_unit,
+    counted, four_digits, parameter_unit, six_digits,
 };
 
 /// One trial as a line: number, parameters with their units, value, verdict with its cause.
@@ -50,6 +50,20 @@ pub fn best_line(
         let _ = writeln!(text, "      {other_gains}");
     }
     text
+}
+
+/// The trial from which the present bounds of a parameter hold, and the bounds before; none where they were not changed.
+pub fn changed_bounds(parameter: &ParameterInfo, rows: &[TrialRecord]) -> Option<String> {
+    let drawn = |row: &TrialRecord| {
+        let range = row.ranges.iter().find(|range| range.name == parameter.name)?;
+        Some((range.low, range.high))
+    };
+    let is_present = |range: &(f64, f64)| *range == (parameter.low, parameter.high);
+    let last = rows.iter().rposition(|row| drawn(row).is_some_and(|range| !is_present(&range)))?;
+    let (low, high) = drawn(&rows[last])?;
+    let since = rows[last + 1..].iter().find(|row| drawn(row).is_some());
+    let since = since.map_or("for the next trial".to_owned(), |row| format!("since trial {}", row.trial));
+    Some(format!("{since}; before, {} to {}", six_digits(low), six_digits(high)))
 }
 
 /// Verdict of a trial, whether its value is by hand, and the cause of a verdict other than a suggested accept.

@@ -88,6 +88,9 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     // Nothing but STOP reaches the session.
     watcher.send("k");
     watcher.wait_for(&["this console only watches"]);
+    session.send("1");
+    session.approve();
+    session.wait_for(&["JUMP"]);
     watcher.send(" ");
     session.wait_for(&["DAMPED"]);
     // The operator's line says who stopped; one press is one line of the log.
@@ -97,10 +100,14 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     std::thread::sleep(Duration::from_millis(300));
     let lines = session.screen().matches("W session   STOP by Grace").count();
     assert_eq!(lines, 1, "{}", session.screen());
+    // Regression: the trial's cause did not name the observer.
+    session.send("2");
+    session.wait_for(&["STOP was pressed by Grace, who watches this session"]);
     watcher.wait_for(&["DAMPED"]);
     assert!(!watcher.screen().contains("NOT CONFIRMED"), "{}", watcher.screen());
     watcher.send("q");
     assert!(watcher.wait().success());
+    session.send("6");
     session.wait_for(&["Grace does not watch any longer"]);
     assert!(session.quit().success());
     assert!(lab.sockets().is_empty() && lab.listed().is_empty());

@@ -117,6 +117,9 @@ fn a_new_configuration_is_valid_and_differs_in_nothing_until_it_is_edited() {
     assert_eq!(program.text(&["config", "diff", "empty", "home/quadfrog"]), back);
     // Regression: `--config` of the other commands was an error.
     assert_eq!(program.text(&["config", "diff", "--config", "home/quadfrog"]), differences);
+    // Regression: of the three commands about a configuration one did not take the option of all others.
+    let by_option = program.text(&["config", "check", "--config", "home/quadfrog"]);
+    assert_eq!(by_option, program.text(&["config", "check", "home/quadfrog"]));
     assert_shows(&program.text(&["config", "check", "home/quadfrog"]), &["simulator: all", "hardware: refused", "Fx"]);
     assert_shows(
         &program.refused(&["config", "check", "home/quadfrog", "--hardware"]),

@@ -195,13 +195,25 @@ fn a_replay_that_goes_to_a_trial_shows_its_row() {
         let trial = console.model.snapshot.tick.trial;
         (trial, trial.map(|trial| console.model.is_later(trial)))
     };
-    use ReplayCommand::{Forward, NextMarker, PlayPause, PreviousMarker, Start, Trial};
+    use ReplayCommand::{Back, Forward, NextMarker, PlayPause, PreviousMarker, Start, Trial};
     assert_eq!(go(&[PlayPause, Start]).0, None);
     for (command, trial) in [(NextMarker, 1), (NextMarker, 3), (PreviousMarker, 1), (Trial(3), 3)] {
         assert_eq!(go(&[command]), (Some(trial), Some(false)));
     }
     // One step on, the previous one is the begin of the trial itself.
     assert_eq!(go(&[Forward(ReplayStep::Second), PreviousMarker]), (Some(3), Some(false)));
+    // Regression: a second forward or back ended the playback without a word; a sample does, to be looked at.
+    let mut plays = |commands: &[ReplayCommand]| {
+        commands.iter().for_each(|command| feed.control_replay(*command));
+        let status = feed.poll(0).into_iter().filter_map(|message| match message {
+            Msg::Replay(status) => Some(status.playing),
+            _ => None,
+        });
+        status.last()
+    };
+    assert_eq!(plays(&[Start, PlayPause]), Some(true));
+    assert_eq!(plays(&[Forward(ReplayStep::Second), Back(ReplayStep::Second)]), Some(true));
+    assert_eq!(plays(&[Forward(ReplayStep::Frame)]), Some(false));
 }
 
 /// Regression: the proposed value of an override stood in no table and in no details.

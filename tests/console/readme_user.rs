@@ -1,10 +1,13 @@
 //! Further answers and screens that a user of the README alone took for wrong.
 
 use crate::support::{Console, assert_shows, line_with, proposal, tick, trial};
-use quadfrog::recording::record::{LogLevel, LogRecord, Record, RequestRecord, StageRecord, Transition};
-use quadfrog::recording::timeline::TrialRun;
+use quadfrog::recording::record::{
+    LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+};
+use quadfrog::recording::timeline::{Timeline, TrialRun};
+use quadfrog::recording::writer::Writer;
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{Fault, Mode, Phase, TransitionCause};
+use quadfrog::telemetry::{Fault, Mode, Phase, Tick, TransitionCause};
 use quadfrog::trial::{
     ExperimentStage, FallRisk, PointRecord, Proposal, ProposalSource, QueuedPoint, SKIPPED, SearchStatus, TrialRecord,
     Verdict,
@@ -358,15 +361,31 @@ fn an_override_says_nothing_of_the_field_that_was_left() {
     assert!(!console.screen(120, 40).contains("Enter again"), "{}", console.screen(120, 40));
 }
 
-/// Regression: the keys to the next fall passed a robot that fell where the trial was judged void.
+/// Regression: the keys to the next fall passed a robot that fell where the trial was judged void, and a trial that was judged a
+/// fall until its verdict was changed.
 #[test]
 fn a_fall_is_found_whatever_its_verdict_is() {
-    let row = |number, suggested, verdict| (number, TrialRecord { suggested, ..trial(number, verdict, None) });
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("session.mcap");
+    let mut writer = Writer::create(&path, &SessionInfo::default(), 0, &[]).expect("a writer");
+    writer.tick(&Tick::default()).expect("a tick");
     let [accept, fall, void] = [Verdict::Accept, Verdict::Fall, Verdict::Void].map(Some);
-    let rows =
-        [row(1, fall, void), row(2, accept, fall), row(3, fall, None), row(4, accept, accept), row(5, void, void)];
-    let timeline = ReplayTimeline { rows: rows.into(), ..ReplayTimeline::default() };
-    assert_eq!([0, 1, 2, 3, 4, 5].map(|number| timeline.fell(number)), [false, true, true, true, false, false]);
+    let judged = [
+        (1, fall, void),
+        (2, accept, fall),
+        (3, fall, None),
+        (4, accept, accept),
+        (5, void, void),
+        (6, accept, fall),
+        (6, accept, accept),
+    ];
+    for (time_ns, (number, suggested, verdict)) in (1..).zip(judged) {
+        let row = TrialRecord { suggested, ..trial(number, verdict, None) };
+        writer.record(&Stamped { time_ns, record: Record::Trial(row) }).expect("a record");
+    }
+    writer.finish().expect("a recording");
+    let recording = Timeline::open(&[path]).expect("the recording");
+    assert_eq!(recording.falls().into_iter().collect::<Vec<_>>(), [1, 2, 3, 6]);
 }
 
 /// Regression: a trial that was not run was "not in this recording" where the playhead was before its proposal.

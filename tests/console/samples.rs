@@ -35,6 +35,14 @@ fn the_samples_are_small_whole_and_of_the_present_format() {
     assert_shows(&best, &["0.721"]);
 }
 
+/// Regression: in a fresh clone `quadfrog replay` denied every recording below its folder.
+#[test]
+fn a_folder_above_the_samples_names_one_of_them() {
+    let above = samples().join("..");
+    let refused = Program::new().refused(&["replay", above.to_str().unwrap()]);
+    assert_shows(&refused, &["no session.mcap in it or in a folder directly below it", "for example ", "samples/fall"]);
+}
+
 #[test]
 fn the_samples_are_replayed() {
     for (name, shown) in [("forward", ["of 20 count", "best 0.721 m (#12)"]), ("fall", ["fall", "pitch 1.0004 rad"])] {

@@ -41,7 +41,10 @@ fn studies_are_listed_and_shown() {
     assert!(show.contains("f0 (Hz)") && show.contains("Best: trial ") && !show.contains("Best: trial  "), "{show}");
     let best = program.text(&["study", "best", &format!("{study}/study.log")]);
     assert!(show.ends_with(&best), "{best}");
-    assert!(program.text(&["study", "list", "."]).contains("no study"));
+    // Regression: "no study below a folder" was said of a folder whose folder holds some.
+    let deeper = ["There is no study in . or directly below it; `quadfrog study list ./recordings` finds some"];
+    assert_shows(&program.text(&["study", "list", "."]), &deeper);
+    assert!(program.text(&["study", "list", &study]).contains(name));
     assert!(program.refused(&["study", "list", "elsewhere"]).contains("elsewhere"));
     assert!(program.refused(&["study", "show", "elsewhere"]).contains("no such journal"));
     assert!(!program.path("elsewhere").exists());

@@ -267,6 +267,8 @@ pub struct ReplayTimeline {
     pub lost_ns: Vec<(u64, u64)>,
     /// The newest row of each trial.
     pub rows: BTreeMap<u32, TrialRecord>,
+    /// Trials that fell, tripped a limit or were judged a fall at any time, whatever their verdict is now.
+    pub falls: BTreeSet<u32>,
     /// Values that the operator has set in place of proposed ones.
     pub overrides: Overrides,
     /// The best trial at the end of the recording, by the rule of the table; none without an accepted one.
@@ -330,11 +332,6 @@ impl ReplayTimeline {
             Some(second) => second.trials.contains(&trial),
             None => self.has_ticks_of(trial),
         }
-    }
-
-    /// Whether a trial was judged a fall, or fell or tripped a limit whatever its verdict is.
-    pub fn fell(&self, trial: u32) -> bool {
-        self.rows.get(&trial).is_some_and(|row| [row.verdict, row.suggested].contains(&Some(Verdict::Fall)))
     }
 
     /// The verdict of a trial; none before it is judged.

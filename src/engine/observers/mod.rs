@@ -27,6 +27,9 @@ const LONGEST_LINE: u64 = 16_384;
 /// Begin of the message about a STOP of an observer; the name follows.
 pub const STOP_BY: &str = "STOP by ";
 
+/// End of that message.
+pub const WHO_WATCHES: &str = ", who watches this session";
+
 /// Log line about an observer, for the session.
 pub type SessionNews = (LogLevel, String);
 

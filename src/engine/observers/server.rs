@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, line, make_socket_folder, read_message};
+use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, WHO_WATCHES, line, make_socket_folder, read_message};
 use crate::printable::is_unprintable;
 use crate::realtime::channel::StopLatch;
 use crate::recording::record::LogLevel;
@@ -138,7 +138,7 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
                 // A press of a key may demand it twice, by the thread that reads the keys and by the screen.
                 if reported.is_none_or(|reported| reported.elapsed() > ONE_PRESS) {
                     let by = name.as_deref().unwrap_or("an observer");
-                    shared.report(LogLevel::Warning, format!("{STOP_BY}{by}, who watches this session"));
+                    shared.report(LogLevel::Warning, format!("{STOP_BY}{by}{WHO_WATCHES}"));
                     reported = Some(Instant::now());
                 }
                 writer.write_all(&line(&Answer::Stopped)?)?;

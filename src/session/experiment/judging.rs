@@ -14,6 +14,11 @@ impl Experiment {
     /// Measures the trial that has ended; it waits for its verdict then. `recorded` is its number of ticks: if some are
     /// missing in `ticks`, nothing is measured.
     pub fn ended(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], recorded: u64) {
+        self.ended_by(trial, end, ticks, recorded, None);
+    }
+
+    /// The same of a trial that `observer`, in words, has stopped; none if this session's operator has.
+    pub fn ended_by(&mut self, trial: u32, end: &TrialEnd, ticks: &[Tick], recorded: u64, observer: Option<&str>) {
         if !matches!(self.state, ExperimentState::Running(running) if running == trial) {
             return;
         }
@@ -21,6 +26,9 @@ impl Experiment {
         let rule = self.spec(trial).objective();
         let measured = if missing == 0 { objective::measure(&rule, ticks) } else { None };
         let (mut suggested, mut cause) = objective::suggest_measured(end, measured.as_ref(), rule.bounce);
+        if let Some(observer) = observer.filter(|_| *end == TrialEnd::Stopped) {
+            cause = format!("{cause} by {observer}");
+        }
         let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
         if missing > 0 && suggested == Verdict::Accept {
             (suggested, cause) =

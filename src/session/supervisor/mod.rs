@@ -41,6 +41,9 @@ const REFRESH_PERIOD_NS: u64 = 500_000_000;
 /// Longest wait for a trial's ticks from the recorder, ns.
 const LONGEST_WAIT_FOR_TICKS_NS: u64 = 10_000_000_000;
 
+/// Longest time between the STOP of an observer and the end of the trial that it has stopped, ns.
+const ONE_STOP_NS: u64 = 1_000_000_000;
+
 /// Receivers of the records: the recorder and the console get the same.
 #[expect(missing_docs, reason = "the types say the rest")]
 pub struct RecordSinks {
@@ -106,6 +109,8 @@ pub struct Supervisor {
     inhibited: Option<String>,
     warned_ns: Option<u64>,
     ended: Option<Ended>,
+    /// The observer who has set STOP last, in words, and when.
+    observer_stop: Option<(String, u64)>,
     unmeasured: VecDeque<TrialTicks>,
     recorder_error: Option<String>,
     /// Error of another file of the recording than the present one.
@@ -164,6 +169,7 @@ impl Supervisor {
             inhibited: None,
             warned_ns: None,
             ended: None,
+            observer_stop: None,
             unmeasured: VecDeque::new(),
             recorder_error: None,
             recorder_warning: None,
@@ -427,8 +433,10 @@ impl Supervisor {
         };
         self.unmeasured.clear();
         self.ended = None;
+        let stop = self.observer_stop.take().filter(|(_, set_ns)| set_ns.abs_diff(ended_ns) < ONE_STOP_NS);
         self.give(JobPurpose::Measure(trial), time_ns, move |experiment| {
-            experiment.ended(trial, &end, &ticks, whole);
+            let observer = stop.as_ref().map(|(observer, _)| observer.as_str());
+            experiment.ended_by(trial, &end, &ticks, whole, observer);
             JobOutput::Done(Ok(()))
         });
         // By itself: the screen shows the trial even while another program holds the journal.
@@ -439,6 +447,11 @@ impl Supervisor {
 
     fn publish(&mut self, record: Record, time_ns: u64) {
         self.recorder_gone |= !self.sinks.send(Stamped { time_ns, record });
+    }
+
+    /// Notes that an observer has set STOP; `observer` names it in words.
+    pub fn stopped_by(&mut self, observer: String, time_ns: u64) {
+        self.observer_stop = Some((observer, time_ns));
     }
 
     /// Writes a message to the log.

@@ -139,13 +139,13 @@ impl ReplayFeed {
             ReplayCommand::Faster => self.speed = (self.speed + 1).min(SPEEDS.len() - 1),
             ReplayCommand::SlowMotion => self.slow_motion = !self.slow_motion,
             ReplayCommand::Forward(step) => {
-                self.playing = false;
+                self.playing &= step == ReplayStep::Second;
                 let mut messages = std::mem::take(&mut self.jumped);
                 self.advance(length_ns(step), &mut messages);
                 self.jumped = messages;
             }
             ReplayCommand::Back(step) => {
-                self.playing = false;
+                self.playing &= step == ReplayStep::Second;
                 self.go_to(at.saturating_sub(length_ns(step)));
             }
             ReplayCommand::NextMarker => self.go_to_place(after(self.markers(), at), "no further trial or fault"),
@@ -223,7 +223,7 @@ impl ReplayFeed {
     /// Begins of faults and of trials that fell.
     fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
         let falls = self.recording.markers().iter().filter(|marker| match marker.kind {
-            MarkerKind::Trial(trial) => self.whole.fell(trial),
+            MarkerKind::Trial(trial) => self.whole.falls.contains(&trial),
             MarkerKind::Fault => true,
         });
         falls.map(|marker| self.place_of(marker))
@@ -330,6 +330,7 @@ impl ReplayFeed {
             faults_ns: faults.map(|marker| marker.time_ns).collect(),
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
+            falls: self.recording.falls(),
             overrides: self.recording.overrides(),
             best: best_of(&self.recording),
             begins_utc_ns: self.recording.begins_utc_ns(),

@@ -54,6 +54,7 @@ pub fn list() -> Result<(), Failure> {
     let sessions = sessions()?;
     if sessions.is_empty() {
         notice!("no session runs on this machine under this user");
+        return Ok(());
     }
     let heading = ["process", "robot", "task", "operator", "since (UTC)", "folder"].map(str::to_owned).to_vec();
     let row = |session: &RunningSession| {

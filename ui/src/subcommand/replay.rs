@@ -58,7 +58,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let named = if arguments.files.is_empty() { &newest[..] } else { &arguments.files };
     if arguments.files.is_empty() && !newest[0].is_dir() {
         let [path] = newest;
-        return Err(RecordingError::NoRecording { path }.into());
+        return Err(RecordingError::NoRecording { path, deeper: None }.into());
     }
     let mut files = Vec::new();
     for path in named {

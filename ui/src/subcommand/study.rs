@@ -34,7 +34,7 @@ pub struct StudyCommand {
 
 #[derive(Debug, Subcommand)]
 enum StudySubcommand {
-    /// List all studies below a folder: task, trials, falls, best
+    /// List the studies in a folder and directly below it: task, trials, falls, best
     List {
         /// The folder
         #[arg(value_name = "DIR", default_value = "recordings")]
@@ -142,7 +142,11 @@ fn list(folder: &Path) -> Result<(), Failure> {
         Failure::input(format!("{}: {cause}; give a folder that holds studies{remedy}", folder.display()))
     })?;
     if files.is_empty() {
-        output::text(&format!("There is no study in {}\n", folder.display()));
+        let folders = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        let deeper = folders.filter(|folder| study_files(folder).is_ok_and(|files| !files.is_empty())).min();
+        let hint =
+            deeper.map_or(String::new(), |deeper| format!("; `quadfrog study list {}` finds some", deeper.display()));
+        output::text(&format!("There is no study in {0} or directly below it{hint}\n", folder.display()));
         return Ok(());
     }
     let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned).to_vec()];
@@ -233,11 +237,13 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
             let _ = writeln!(text, "  confirmation of the best: {confirmation}");
         }
     }
+    let rows = opened.rows();
     for parameter in parameters {
-        let _ = writeln!(text, "  {} from {} to {} {}", parameter.name, parameter.low, parameter.high, parameter.unit);
+        let changed = table::changed_bounds(parameter, &rows).map_or(String::new(), |changed| format!(" ({changed})"));
+        let ParameterInfo { name, low, high, unit, .. } = parameter;
+        let _ = writeln!(text, "  {name} from {low} to {high} {unit}{changed}");
     }
     text.push('\n');
-    let rows = opened.rows();
     let unit = if ours.is_some() { opened.unit() } else { "value" };
     let best = opened.best(&rows).map(|best| best.trial);
     text += &match ours {

@@ -1,5 +1,6 @@
 //! The operator's next possible step.
 
+use quadfrog::engine::WHO_WATCHES;
 use quadfrog::robot::joint_name;
 use quadfrog::session::prior::PriorProgress;
 use quadfrog::telemetry::{Mode, TransitionCause};
@@ -128,7 +129,8 @@ fn live(model: &Model) -> NextStep {
             let stopped = stopped(model);
             let because = match cause.is_empty() || is_stop || stopped == FELL && waiting.is_some() {
                 true => String::new(),
-                false => format!(": {cause}"),
+                // Of an observer the name is enough: the keys of the verdict need the room.
+                false => format!(": {}", cause.strip_suffix(WHO_WATCHES).unwrap_or(cause)),
             };
             // The key first: a long reason may be cut.
             let mut lead =

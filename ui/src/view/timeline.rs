@@ -31,7 +31,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let mut put = |at: usize, mark: Mark| marks[at] = marks[at].max(mark);
     for (index, trial) in timeline.trials.iter().enumerate() {
         let later = trial.begin_ns > replay.time_ns;
-        put(cell(trial.begin_ns), Mark::Trial { fell: timeline.fell(trial.trial), later, index });
+        put(cell(trial.begin_ns), Mark::Trial { fell: timeline.falls.contains(&trial.trial), later, index });
         if replay.looping == Some(trial.trial) {
             (cell(trial.begin_ns)..=cell(trial.end_ns)).for_each(|at| put(at, Mark::Looped));
         }

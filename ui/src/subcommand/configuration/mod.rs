@@ -59,6 +59,9 @@ enum ConfigSubcommand {
         /// Folder of the configuration [default: the configuration in force]
         #[arg(value_name = "DIR")]
         folder: Option<PathBuf>,
+        /// DIR, as for other commands
+        #[arg(long, value_name = "DIR", conflicts_with = "folder")]
+        config: Option<PathBuf>,
         /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
         #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
         model: String,
@@ -91,7 +94,9 @@ pub fn run(command: &ConfigCommand) -> Result<(), Failure> {
         ConfigSubcommand::Diff { folder, other, config, model } => {
             differences(folder.as_deref().or(config.as_deref()), other.as_deref(), model)
         }
-        ConfigSubcommand::Check { folder, model, hardware } => check(folder.as_deref(), model, *hardware),
+        ConfigSubcommand::Check { folder, config, model, hardware } => {
+            check(folder.as_deref().or(config.as_deref()), model, *hardware)
+        }
         ConfigSubcommand::Init { folder } => init(folder.as_deref()),
         ConfigSubcommand::Schema { file, output } => write_schemas(file.as_deref(), output.as_deref()),
         ConfigSubcommand::Reference => {
