@@ -205,11 +205,11 @@ fn a_replay_that_goes_to_a_trial_shows_its_row() {
     // Regression: a second forward or back ended the playback without a word; a sample does, to be looked at.
     let mut plays = |commands: &[ReplayCommand]| {
         commands.iter().for_each(|command| feed.control_replay(*command));
-        let status = feed.poll(0).into_iter().filter_map(|message| match message {
+        let mut status = feed.poll(0).into_iter().filter_map(|message| match message {
             Msg::Replay(status) => Some(status.playing),
             _ => None,
         });
-        status.last()
+        status.next_back()
     };
     assert_eq!(plays(&[Start, PlayPause]), Some(true));
     assert_eq!(plays(&[Forward(ReplayStep::Second), Back(ReplayStep::Second)]), Some(true));
