@@ -24,6 +24,18 @@ fn a_list_with_wrong_entries_names_the_entries_that_it_needs() {
     refuses("optimize.toml", bounds, &["optimize.toml:2", "`bounds.f0` must be a list of two numbers, not"]);
 }
 
+/// Regression: a folder without a configuration file was taken for one, and the defaults were in force without a word.
+#[test]
+fn a_folder_without_a_configuration_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("notes.txt"), "none").unwrap();
+    fs::create_dir(folder.path().join("hardware_like")).unwrap();
+    let error = Config::load(Some(folder.path())).expect_err("should be refused").to_string();
+    for part in ["holds no configuration file", "control.toml", "safety.toml", "or none, for the defaults"] {
+        assert!(error.contains(part), "{part} is not in: {error}");
+    }
+}
+
 #[test]
 fn the_defaults_are_fit_for_use() {
     for name in RobotDescription::embedded_names() {

@@ -76,6 +76,7 @@ impl Config {
 
     /// Loads the defaults, with texts (name, origin, text) laid over them, and the files of `folder` over both.
     fn load_over(mut texts: Vec<(String, String, String)>, folder: Option<&Path>) -> Result<Config, ConfigError> {
+        let below = texts.len();
         if let Some(folder) = folder {
             refuse_unknown_files(folder)?;
             for (name, _) in FILES {
@@ -84,6 +85,12 @@ impl Config {
                     let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
                     texts.push((name.to_owned(), path.display().to_string(), text));
                 }
+            }
+            if texts.len() == below {
+                return Err(ConfigError::NoFile {
+                    path: folder.to_owned(),
+                    known: FILES.map(|(file, _)| file).join(", "),
+                });
             }
         }
         let layers = texts.iter().map(|(file, origin, text)| ConfigLayer { file, origin, text });

@@ -26,6 +26,8 @@ use std::path::PathBuf;
 pub enum ConfigError {
     #[error("{}: no such configuration folder; give a folder that holds control.toml, safety.toml, ... or none, for the defaults", path.display())]
     NoFolder { path: PathBuf },
+    #[error("{}: holds no configuration file; the files are {known}; give a folder that holds one, or none, for the defaults", path.display())]
+    NoFile { path: PathBuf, known: String },
     #[error("{}: not a configuration file; the files are {known}", path.display())]
     UnknownFile { path: PathBuf, known: String },
     #[error("{}: {source}", path.display())]

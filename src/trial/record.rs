@@ -56,6 +56,9 @@ pub const SKIPPED: &str = "skipped before the jump";
 /// Begin of the cause of a trial that the program did not let run.
 pub const NOT_RUN: &str = "not run: ";
 
+/// Part of the cause of a trial that jumped and was not measured, because its recording is not whole.
+pub(crate) const NOT_RECORDED: &str = "not recorded: not measured";
+
 impl TrialRecord {
     /// Returns whether it is void because it was refused before its jump.
     pub fn was_not_run(&self) -> bool {
@@ -116,6 +119,12 @@ impl TrialRecord {
             (Verdict::Void, ProposalSource::OtherProgram) => "failed",
             (verdict, _) => verdict.name(),
         })
+    }
+
+    /// Returns whether it ended before its impulse: by its rules void, with nothing to measure.
+    pub fn did_not_jump(&self) -> bool {
+        let measurable = self.measured.is_some() || !self.repeats.is_empty() || self.cause.contains(NOT_RECORDED);
+        self.suggested == Some(Verdict::Void) && !measurable
     }
 
     /// Returns whether it counts with a value measured by hand.

@@ -198,11 +198,12 @@ fn accepting_what_was_not_suggested_asks_once_more() {
     assert_eq!(console.requests(&["a"]), accept, "a suggested accept needs one key");
 }
 
-/// Regression: a cancelled countdown offered to accept the trial, and the session refused it.
+/// Regression: a trial without a value was offered to be accepted, and the session refused it.
 #[test]
 fn a_trial_without_a_value_cannot_be_accepted_before_one_is_given() {
     let mut console = Console::review(Mode::Review, Verdict::Void);
-    console.record(Record::Trial(TrialRecord { measured: None, ..trial(0, None, Some(Verdict::Void)) }));
+    let cause = "3 ticks of it not recorded: not measured".into();
+    console.record(Record::Trial(TrialRecord { measured: None, cause, ..trial(0, None, Some(Verdict::Void)) }));
     assert!(!console.screen(120, 40).contains("a accept"), "it is not offered");
     assert_eq!(console.requests(&["a"]), []);
     assert_shows(console.said(), &["a is not possible: nothing was measured: = gives a value measured by hand"]);

@@ -446,3 +446,31 @@ fn a_void_trial_covers_no_accepted_one_among_the_landings() {
     let accepted = |line: &str| line.trim_end().ends_with(" o");
     assert!(screen.lines().any(accepted), "{screen}");
 }
+
+/// Regression: after a cancelled countdown the program offered a fall, and a value by hand of a jump that had not been.
+#[test]
+fn of_a_trial_that_did_not_jump_void_and_the_same_again_are_left() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    let cause = "countdown cancelled, the robot did not jump".into();
+    let cancelled = TrialRecord { cause, measured: None, ..trial(0, None, Some(Verdict::Void)) };
+    console.record(Record::Trial(cancelled));
+    console.stage(ExperimentStage::Review, 0);
+    for key in ["a", "f", "="] {
+        console.wait(1_000);
+        assert_eq!(console.requests(&[key]), [], "{key}");
+        assert_shows(console.said(), &["the robot did not jump: v void gives the point up, r runs it again"]);
+    }
+    let last = last(&console, 120);
+    assert_shows(&last, &["v void (suggested)", "r re-run"]);
+    assert!(!last.contains("f fall") && !last.contains("by hand"), "{last}");
+}
+
+/// Regression: a trial of an earlier session, with which nothing is recorded here, was "no jump has been recorded yet".
+#[test]
+fn a_trial_of_another_session_that_cannot_be_compared_says_where_it_is() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.press(&["2", "Home", "c"]);
+    assert_shows(console.said(), &["trial 0 was recorded in another session: quadfrog replay"]);
+}

@@ -9,7 +9,7 @@ use quadfrog::optimize::trial::{Trial, TrialState};
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, import};
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{FallCause, TrialEnd};
+use quadfrog::telemetry::{FallCause, Fault, TrialEnd};
 use quadfrog::trial::{ExperimentStage, ProposalSource, TrialRecord, Verdict};
 use support::{
     accept, approve, experiment, far, joined, open, parameters, plan, run, skip, study, study_in, ticks,
@@ -491,6 +491,21 @@ fn a_trial_that_was_stopped_before_the_program_ended_says_both() {
     let row = experiment.row(spec.trial).unwrap();
     assert_eq!(row.verdict, Some(Verdict::Void));
     assert_eq!(row.cause, "STOP was pressed; interrupted: the program ended before the verdict");
+}
+
+/// Regression: the cause of a stopped trial that the end of its session closes stood twice in its row.
+#[test]
+fn a_trial_that_is_closed_for_the_reason_of_its_end_names_it_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let spec = run(&mut experiment, TrialEnd::Fault(Fault::OperatorLeft));
+    experiment.keep_measurement().unwrap();
+    let cause = experiment.row(spec.trial).unwrap().cause.clone();
+    experiment.close_unreviewed().unwrap();
+    experiment.close().unwrap();
+    drop(experiment);
+    let experiment = open(folder.path());
+    assert_eq!(experiment.row(spec.trial).unwrap().cause, cause);
 }
 
 /// Killed between the verdict and its telling, a re-run is not forgotten; killed once more, it does not come twice.

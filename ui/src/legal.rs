@@ -2,7 +2,7 @@
 
 use quadfrog::control::mode::{self, Trigger};
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Verdict};
+use quadfrog::trial::{ExperimentStage, Proposal, TrialRecord, Verdict};
 use ratatui::layout::Size;
 
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
@@ -48,7 +48,8 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::HandValue => {
             may_request(model)?;
             require(model.session.stage_is(ExperimentStage::Review), "no trial waits for a verdict")?;
-            waiting_trial_is_meant(model)
+            waiting_trial_is_meant(model)?;
+            require(!model.session.under_review().is_some_and(TrialRecord::did_not_jump), &did_not_jump(model))
         }
         A::Rerun => may_rerun(model),
         A::Undo => {
@@ -66,7 +67,10 @@ pub fn legal(action: Action, model: &Model) -> Legality {
         A::Ghost => {
             // Of a trial of another session it says where that is; a replay reads it.
             let recorded = model.timeline.as_ref().is_some_and(|timeline| !timeline.trials.is_empty());
-            let known = recorded || model.history.traces().next().is_some() || model.session.trials.best().is_some();
+            let known = recorded
+                || model.history.traces().next().is_some()
+                || model.session.trials.best().is_some()
+                || model.view == View::Trials && model.selected_trial().is_some();
             require(known, "no jump has been recorded yet")
         }
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
@@ -295,11 +299,19 @@ pub fn waiting_trial_is_meant(model: &Model) -> Legality {
     }
 }
 
+/// The reason for which a trial that ended before its impulse is neither accepted nor a fall, and what there is.
+fn did_not_jump(model: &Model) -> String {
+    let [void, rerun] = [Action::Void, Action::Rerun].map(|action| model.keymap.key(action));
+    format!("the robot did not jump: {void} void gives the point up, {rerun} runs it again")
+}
+
 /// Under review, or in Trials a judged row that has another verdict.
 fn may_judge(model: &Model, verdict: Verdict) -> Legality {
     may_request(model)?;
     if model.session.stage_is(ExperimentStage::Review) {
         waiting_trial_is_meant(model)?;
+        let jumped = !model.session.under_review().is_some_and(TrialRecord::did_not_jump);
+        require(jumped || verdict == Verdict::Void, &did_not_jump(model))?;
         let value = model.session.under_review().and_then(|row| model.session.value_if_accepted(row));
         let key = model.keymap.key(Action::HandValue);
         let reason = format!("nothing was measured: {key} gives a value measured by hand, or judge it otherwise");
@@ -317,6 +329,7 @@ fn may_judge(model: &Model, verdict: Verdict) -> Legality {
         return refuse(format!("the verdict of trial {trial} is the last one: {undo} takes it back"));
     }
     require(row.verdict != Some(verdict), &format!("trial {trial} is {} already", verdict.name()))?;
+    require(!row.did_not_jump(), &format!("the robot did not jump in trial {trial}: it stays void"))?;
     let has_value = verdict != Verdict::Accept || model.session.value_if_accepted(row).is_some();
     require(has_value, &format!("nothing was measured in trial {trial}: it cannot be accepted"))
 }

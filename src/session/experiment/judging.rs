@@ -6,7 +6,7 @@ use super::{Experiment, ExperimentState, PendingVerdict};
 use crate::optimize::study::{Outcome, StudyError};
 use crate::session::objective;
 use crate::telemetry::{Tick, TrialEnd};
-use crate::trial::{JudgedBy, JumpParameters, TrialRecord, Verdict, counted};
+use crate::trial::{JudgedBy, JumpParameters, NOT_RECORDED, TrialRecord, Verdict, counted};
 
 const NOT_UNDER_REVIEW: &str = "no trial is under review";
 
@@ -30,11 +30,14 @@ impl Experiment {
             cause = format!("{cause} by {observer}");
         }
         let jumped = missing > 0 || ticks.iter().any(|tick| tick.trial.is_some() && tick.trial_time_s >= 0.0);
-        if missing > 0 && suggested == Verdict::Accept {
-            (suggested, cause) =
-                (Verdict::Void, format!("{} of it not recorded: not measured", counted(missing as usize, "tick")));
-        } else if objective::trips_limit(end) && !jumped {
-            (suggested, cause) = (Verdict::Void, format!("before the jump: {cause}"));
+        let not_recorded = format!("{} of it {NOT_RECORDED}", counted(missing as usize, "tick"));
+        match suggested {
+            Verdict::Accept if missing > 0 => (suggested, cause) = (Verdict::Void, not_recorded),
+            Verdict::Void if missing > 0 => cause = format!("{cause}; {not_recorded}"),
+            _ if objective::trips_limit(end) && !jumped => {
+                (suggested, cause) = (Verdict::Void, format!("before the jump: {cause}"));
+            }
+            _ => {}
         }
         if let Some(row) = self.rows.get_mut(&trial) {
             row.measured = measured;

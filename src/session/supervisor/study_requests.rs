@@ -44,6 +44,8 @@ struct Before {
     undoable: Option<u32>,
     /// The proposal whose values the operator has changed.
     changed: Option<u32>,
+    /// Values of the open proposal.
+    values: Option<Vec<f64>>,
     /// Number and proposed values of the open proposal, for a request that may draw it again.
     drawn: Option<(u32, Vec<f64>)>,
     /// The fixed parameters and whether the study is finished, for a changed verdict.
@@ -57,7 +59,13 @@ impl Before {
         let drawn = if searches { drawn(experiment) } else { None };
         let counts = matches!(request, ChangeVerdict { .. })
             .then(|| (experiment.fixed(), experiment.stage() == ExperimentStage::Finished));
-        Before { undoable: experiment.undoable(), changed: experiment.changed_proposal(), drawn, counts }
+        Before {
+            undoable: experiment.undoable(),
+            changed: experiment.changed_proposal(),
+            values: values(experiment),
+            drawn,
+            counts,
+        }
     }
 }
 
@@ -72,7 +80,8 @@ fn side_effects(experiment: &mut Experiment, request: &OperatorRequest, before: 
     if let Some(trial) = before.changed {
         match request {
             ClearOverrides | Override { .. } | OverrideGain { .. } | Skip { .. } => {}
-            _ if experiment.changed_proposal().is_none() => {
+            // A queued point with the same values takes the place of the proposal.
+            _ if experiment.changed_proposal().is_none() && values(experiment) != before.values => {
                 text += &format!("; the changed values of proposal {trial} are dropped: change them again");
             }
             Undo | Judge(_) => text += &format!("; proposal {trial} keeps its changed values"),
@@ -115,6 +124,11 @@ fn of_changed_count(experiment: &Experiment, fixed: &BTreeMap<String, FixedParam
 fn drawn(experiment: &Experiment) -> Option<(u32, Vec<f64>)> {
     let proposal = experiment.proposal()?;
     Some((proposal.trial, proposal.parameters.iter().map(|p| p.proposed).collect()))
+}
+
+fn values(experiment: &Experiment) -> Option<Vec<f64>> {
+    let proposal = experiment.proposal()?;
+    Some(proposal.parameters.iter().chain(&proposal.gains).map(|p| p.value).collect())
 }
 
 /// The answer to a verdict. If another program has ended the trial, the review is over as well.

@@ -103,7 +103,8 @@ pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Confi
 
 /// Returns the user's own configuration, if there is one, and reports that it is used.
 fn user_config() -> Option<PathBuf> {
-    let own = user_folder().filter(|folder| folder.is_dir())?;
+    // An empty one is as good as none.
+    let own = user_folder().filter(|folder| folder.read_dir().is_ok_and(|mut entries| entries.next().is_some()))?;
     notice!("configuration: {}", own.display());
     Some(own)
 }

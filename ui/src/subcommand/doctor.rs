@@ -168,7 +168,7 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
             }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;
             let (p50, p99, max) = (at(WAKE_UPS / 2), at(WAKE_UPS * 99 / 100), at(WAKE_UPS - 1));
-            let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us of {WAKE_UPS}");
+            let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us in {WAKE_UPS} wake-ups");
             let remedy = "a robot is not armed while p99 exceeds 500 us: see the items above; end other programs";
             items.push(DoctorItem::new(LATENCY, found, p99 < 500.0, remedy));
             items

@@ -67,8 +67,11 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
     if let Some(name) = &b.recording {
         // The end of a path names the study and the file.
         let room = usize::from(body.width).saturating_sub(7);
-        let skipped = name.chars().count().saturating_sub(room);
-        let text = format!(" B of {}", name.chars().skip(skipped).collect::<String>());
+        let end = |skipped: usize| name.chars().skip(skipped).collect::<String>();
+        let text = match name.chars().count().saturating_sub(room) {
+            0 => format!(" B of {name}"),
+            skipped => format!(" B of ..{}", end(skipped + 2)),
+        };
         lines.push(Line::from(span(theme, Role::Quiet, text)));
     }
     let unit = if a.unit == b.unit { format!("J {}", a.unit) } else { format!("J {},{}", a.unit, b.unit) };

@@ -7,6 +7,7 @@ use quadfrog::trial::{TrialRecord, six_digits};
 use tui_input::{Input, InputRequest};
 
 use crate::action::Action;
+use crate::draw::clock_ms;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
@@ -217,7 +218,7 @@ fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
     let duration_ns = model.replay.as_ref().map_or(0, |replay| replay.duration_ns);
     let time_ns = (time_s * 1e9).round() as u64;
     if time_ns > duration_ns {
-        return Err(format!("`{text}` is after the end, {:.3} s", duration_ns as f64 / 1e9));
+        return Err(format!("`{text}` is after the end, {}", clock_ms(duration_ns)));
     }
     Ok(ReplayCommand::Time(time_ns))
 }
