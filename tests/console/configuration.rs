@@ -90,6 +90,12 @@ fn the_configuration_of_the_user_is_in_force_unless_another_one_is_given() {
     program.write("own/quadfrog/safety.toml", "[fall]\nrol_rad = 0.9\n");
     let (_, noticed) = run(&["optimize", "--trials", "1"]);
     assert_shows(&noticed, &["own/quadfrog/safety.toml:2", "rol_rad", "roll_rad"]);
+    // One's own place without a TOML file is as good as none; a folder that is given is not.
+    fs::remove_file(program.path("own/quadfrog/safety.toml")).unwrap();
+    program.write("own/quadfrog/notes.txt", "none");
+    assert_shows(&run(&["config", "check"]).0, &["hardware: all limits are inside their ranges"]);
+    let (_, refused) = run(&["config", "check", "--config", "own/quadfrog"]);
+    assert_shows(&refused, &["own/quadfrog: holds no configuration file"]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Arguments that several commands share, and parsers for the engine's named values.
 
 use std::fmt::Display;
+use std::fs::DirEntry;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -103,8 +104,10 @@ pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Confi
 
 /// Returns the user's own configuration, if there is one, and reports that it is used.
 fn user_config() -> Option<PathBuf> {
-    // An empty one is as good as none.
-    let own = user_folder().filter(|folder| folder.read_dir().is_ok_and(|mut entries| entries.next().is_some()))?;
+    // One without a TOML file is as good as none.
+    let is_toml = |entry: DirEntry| entry.path().extension().is_some_and(|extension| extension == "toml");
+    let has_toml = |folder: &PathBuf| folder.read_dir().is_ok_and(|entries| entries.flatten().any(is_toml));
+    let own = user_folder().filter(has_toml)?;
     notice!("configuration: {}", own.display());
     Some(own)
 }
