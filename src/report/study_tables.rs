@@ -95,16 +95,18 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
     );
     let mut table = Table::new(caption, columns);
     for group in groups {
-        let curves: Vec<Vec<f64>> = group.iter().map(|study| study.best_so_far()).collect();
+        let curves: Vec<Vec<_>> = group.iter().map(|study| study.best_so_far_rows().collect()).collect();
         let cell = |count: &usize| {
-            let at = |curve: &Vec<f64>| curve.get(*count - 1).copied().filter(|value| value.is_finite());
-            let values: Option<Vec<f64>> = curves.iter().map(at).collect();
-            values.filter(|values| !values.is_empty()).map_or(Cell::Missing, |values| {
+            let at = |curve: &Vec<Option<&TrialRecord>>| {
+                let best = curve.get(*count - 1).copied().flatten()?;
+                Some((best.value.filter(|value| value.is_finite())?, best.counts_by_hand()))
+            };
+            let best: Option<Vec<(f64, bool)>> = curves.iter().map(at).collect();
+            best.filter(|best| !best.is_empty()).map_or(Cell::Missing, |best| {
+                let (values, by_hand): (Vec<f64>, Vec<bool>) = best.into_iter().unzip();
                 let (mean, deviation) = mean_and_deviation(&values);
                 let spread = if values.len() > 1 { format!(" +- {deviation:.3}") } else { String::new() };
-                let mut best = group.iter().filter_map(|study| study.best_so_far_rows().nth(*count - 1).flatten());
-                let by_hand = best.any(TrialRecord::counts_by_hand);
-                let mark = if by_hand { format!(" {BY_HAND}") } else { String::new() };
+                let mark = if by_hand.contains(&true) { format!(" {BY_HAND}") } else { String::new() };
                 Cell::text(format!("{mean:.3}{spread}{mark}"))
             })
         };

@@ -94,7 +94,7 @@ fn close_all(study: &mut Study, trials: &[Trial], cause: &str) -> Result<Vec<Str
     let mut log = Vec::new();
     for trial in trials {
         let left = TrialAttributes::of(trial);
-        // Another reason for which a trial was void before its program ended, as a pressed STOP, is told first.
+        // A measured trial keeps its own reason, for example STOP, before that of the closing.
         let other = |before: &&str| left.suggested.is_some() && !before.is_empty() && *before != cause;
         let cause = match left.cause.as_deref().filter(other) {
             Some(before) => &format!("{before}; {cause}"),
