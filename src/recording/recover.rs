@@ -1,12 +1,12 @@
 //! Recovery of a recording that was not finished or is damaged.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::records::Record;
+use mcap::records::{Metadata, Record};
 
 use super::container::Container;
 use super::error::RecordingError;
@@ -14,6 +14,10 @@ use super::event_index;
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
 use crate::trial::counted_are;
+
+/// Name of the metadata record of a recovered file that lacks something, and its key for what that is.
+pub(super) const RECOVERED: &str = "recovered";
+pub(super) const LOST: &str = "lost";
 
 /// Result of a recovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,18 +85,7 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
     });
     // The beginning of a copy is of no use, and takes the room that may be short.
     let copied = named.inspect_err(|_| drop(fs::remove_file(&unfinished)))?;
-    let damaged = [
-        (copied.damaged_chunks > 0)
-            .then(|| format!("{} of {} damaged", copied.damaged_chunks, counted_are(container.chunks.len(), "chunk"))),
-        (copied.damaged_extras > 0).then(|| format!("{} damaged", counted_are(copied.damaged_extras, "attachment"))),
-    ];
-    let lost: Vec<_> = container.cut.take().into_iter().chain(damaged.into_iter().flatten()).collect();
-    Ok(Recovered {
-        path: target.into(),
-        ticks: copied.ticks,
-        messages: copied.messages,
-        lost: (!lost.is_empty()).then(|| lost.join("; ")),
-    })
+    Ok(Recovered { path: target.into(), ticks: copied.ticks, messages: copied.messages, lost: copied.lost })
 }
 
 /// Copies records, with the new file's numbers of schemas and channels.
@@ -110,6 +103,8 @@ struct CopyCounts {
     damaged_chunks: usize,
     /// Attachments and metadata.
     damaged_extras: usize,
+    /// Description of the lost parts.
+    lost: Option<String>,
 }
 
 impl RecordCopier {
@@ -149,8 +144,25 @@ impl RecordCopier {
                 Ok(Err(_)) | Err(_) => self.done.damaged_chunks += 1,
             }
         }
+        self.done.lost = self.lost(container);
+        if let Some(lost) = &self.done.lost {
+            let metadata = BTreeMap::from([(LOST.into(), lost.clone())]);
+            self.out.mcap.write_metadata(&Metadata { name: RECOVERED.into(), metadata })?;
+        }
         self.out.finish()?;
         Ok(self.done)
+    }
+
+    /// Describes what the new file lacks of the old one.
+    fn lost(&self, container: &Container) -> Option<String> {
+        let CopyCounts { damaged_chunks, damaged_extras, .. } = self.done;
+        let damaged = [
+            (damaged_chunks > 0)
+                .then(|| format!("{damaged_chunks} of {} damaged", counted_are(container.chunks.len(), "chunk"))),
+            (damaged_extras > 0).then(|| format!("{} damaged", counted_are(damaged_extras, "attachment"))),
+        ];
+        let lost: Vec<_> = container.cut.clone().into_iter().chain(damaged.into_iter().flatten()).collect();
+        (!lost.is_empty()).then(|| lost.join("; "))
     }
 
     fn record(&mut self, record: Record<'_>) -> Result<(), McapError> {

@@ -211,7 +211,7 @@ fn a_chart_of_two_rows_names_its_range_and_no_row() {
     let mut console = charting(&["roll"]);
     (0..200).for_each(|step| drop(console.update(Msg::Tick(Box::new(distinct(5 * step))))));
     let torques = |console: &mut Console, columns, rows| {
-        (0..6)
+        (0..7)
             .map(|_| {
                 console.press(&["t"]);
                 console.screen(columns, rows)
@@ -271,4 +271,23 @@ fn the_picture_says_that_it_shows_the_present_where_the_charts_do_not() {
     // The charts show the present, too.
     console.press(&["z"]);
     assert_shows(&console.screen(200, 60), &["Robot ─"]);
+}
+
+/// Regression: the next set of `t` dropped the chosen series, and no key showed them again.
+#[test]
+fn the_chosen_series_are_one_of_the_sets() {
+    let mut console = charting(&["roll", "pitch"]);
+    (0..200).for_each(|step| drop(console.update(Msg::Tick(Box::new(distinct(5 * step))))));
+    let shows_the_choice = |console: &mut Console| {
+        let screen = console.screen(120, 40);
+        ["roll", "pitch", "height"].iter().all(|name| screen.contains(name)) && !screen.contains("FR foot z")
+    };
+    // The height of the trunk is the seventh of the list.
+    console.press(&["T", "Down", "Down", "Down", "Down", "Down", "Down", "x", "Esc"]);
+    assert!(shows_the_choice(&mut console));
+    let again = (1..10).find(|_| {
+        console.press(&["t"]);
+        shows_the_choice(&mut console)
+    });
+    assert_eq!(again, Some(7), "joints, the robot and four sets are before it");
 }

@@ -280,6 +280,21 @@ fn the_title_of_the_arming_checks_is_whole_in_a_narrow_terminal() {
     assert_shows(&line_with(&screen, "Arming checks at "), &["PgUp PgDn"]);
 }
 
+/// Regression: before the first answer of the robot the heading named a time of checks that had not been, and no count.
+#[test]
+fn the_title_of_arming_checks_that_have_not_been_names_no_time() {
+    let mut console = Console::new();
+    console.record(Record::Session(session()));
+    console.mode(Mode::Offline);
+    let health = {
+        console.press(&["5"]);
+        console.screen(120, 40)
+    };
+    assert_shows(&line_with(&health, "Arming checks"), &["not yet (P)"]);
+    console.press(&["P"]);
+    assert_shows(&line_with(&console.screen(120, 40), "Arming checks: "), &["Arming checks: not yet"]);
+}
+
 /// Regressions: an empty box, a list without its length, an old answer below a dialog, a footer without the paging keys.
 #[test]
 fn lists_say_how_long_they_are_and_that_nothing_matches() {

@@ -201,6 +201,12 @@ fn a_recording_is_recovered_into_the_file_that_is_given() {
     let other = program.refused(&["recover", "cut.mcap"]);
     assert_shows(&other, &["cut.mcap: there is no such file", "give cut.mcap.part"]);
     assert_eq!(Player::open(program.path("found.mcap")).unwrap().damage(), None);
+    // Regression: of a recovered file nothing said any more that it lacks something.
+    let checked = program.text(&["replay", "--check", "found.mcap"]);
+    assert_shows(
+        &checked,
+        &["recovered from a file that was not whole: it was cut off", "that was recovered is there"],
+    );
     // Nothing is overwritten, the name says what the file is, and a lock without a session does not count.
     assert!(program.refused(&["recover", "cut.mcap.part", "--output", "found.mcap"]).contains("exists already"));
     assert!(program.refused(&["recover", "cut.mcap.part", "--output", "found"]).contains("must end in .mcap"));
@@ -228,7 +234,7 @@ fn a_whole_recording_is_not_recovered_and_a_damaged_one_names_how_its_study_read
     assert_shows(&printed, &["session.mcap is unchanged.", "once you have moved", "renamed the new file to"]);
     fs::rename(&file, program.path("damaged.mcap")).unwrap();
     fs::rename(&recovered, &file).unwrap();
-    assert_shows(&program.text(&["replay", "--check", study.to_str().unwrap()]), &["whole"]);
+    assert_shows(&program.text(&["replay", "--check", study.to_str().unwrap()]), &["not whole: 1 of "]);
     // Regression: of a name without a file the ending was refused.
     let missing = study.join("nothing.part");
     let refused = program.refused(&["recover", missing.to_str().unwrap()]);

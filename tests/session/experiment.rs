@@ -161,10 +161,20 @@ fn a_verdict_can_be_undone_until_the_next_trial_begins() {
 #[test]
 fn the_row_of_a_cancelled_countdown_says_that_the_robot_did_not_jump() {
     let mut experiment = experiment(5);
-    let trial = run(&mut experiment, TrialEnd::Cancelled).trial;
+    let trial = approve(&mut experiment).trial;
+    experiment.ended(trial, &TrialEnd::Cancelled, &[], 0);
     let row = experiment.row(trial).unwrap();
     assert_eq!(row.cause, "countdown cancelled, the robot did not jump");
     assert_eq!(row.suggested, Some(Verdict::Void));
+    // Regression: a fall and a value by hand were taken for a jump that had not been.
+    for refused in [
+        experiment.judge(Verdict::Fall, false),
+        experiment.judge(Verdict::Accept, false),
+        experiment.set_hand_value(Some(0.5)),
+    ] {
+        assert!(refused.unwrap_err().to_string().contains("the robot did not jump"));
+    }
+    assert_eq!(experiment.stage(), ExperimentStage::Review);
     experiment.judge(Verdict::Void, true).unwrap();
     // The study has begun the trial at its approval: the re-run has another number.
     assert_eq!(experiment.proposal().map(|proposal| (proposal.trial, proposal.parent)), Some((trial + 1, Some(trial))));

@@ -206,8 +206,8 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::ZoomIn, "zoom-in", &["+"], G::Charts, "shorter time window"),
         row(A::ZoomOut, "zoom-out", &["-"], G::Charts, "longer time window"),
         row(A::ChartMode, "chart-mode", &["w"], G::Charts, "sweep or scroll"),
-        row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, joints, robot; Health: history"),
-        row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts"),
+        row(A::Series, "series", &["t"], G::Charts, "next set: attitude, forces, motion, torques, your choice, joints, robot; Health: history"),
+        row(A::ChooseSeries, "choose-series", &["T"], G::Charts, "choose the series of the charts: a set of its own"),
         row(A::Ghost, "ghost", &["c"], G::Charts, "best (Trials: selected) trial under the charts, ~ in Trials; a second one: compare both"),
 
         row(A::Sort, "sort", &["s"], G::Tables, "sort by the next: value, verdict, others from the left"),

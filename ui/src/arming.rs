@@ -127,9 +127,9 @@ fn line(
 
 /// The number of items that forbid arming, in words, with the time of the checks once the robot is armed.
 pub fn summary(model: &Model) -> String {
-    match (result(model), checked_at(model)) {
-        (result, Some(at)) if !result.is_empty() => format!("at {at}: {result}"),
-        (result, _) => result,
+    match checked_at(model) {
+        Some(at) => format!("at {at}: {}", result(model)),
+        None => result(model),
     }
 }
 
@@ -146,13 +146,14 @@ fn result(model: &Model) -> String {
     let session = &model.session;
     let needed = session.arming_checks.iter().filter(|item| item.state != ArmingCheckState::NotNeeded).count();
     match (session.arming_checks.is_empty(), session.failing_checks()) {
-        (true, _) => String::new(),
+        (true, _) => "not yet".to_owned(),
         (false, 0) => format!("{needed} passed"),
         (false, count) => format!("{count} of {needed} not yet"),
     }
 }
 
-/// The time of the checks once the robot is armed.
+/// The time of the checks once the robot is armed; none of checks that have not been.
 fn checked_at(model: &Model) -> Option<String> {
-    model.arming_checks_are_past().then(|| wall_clock(model, model.session.arming_checked_ns))
+    let past = model.arming_checks_are_past() && !model.session.arming_checks.is_empty();
+    past.then(|| wall_clock(model, model.session.arming_checked_ns))
 }

@@ -8,6 +8,7 @@ use super::lost::{DamagedChunk, LostPart};
 use crate::recording::chunk::ChunkRecords;
 use crate::recording::container::Chunk;
 use crate::recording::error::RecordingError;
+use crate::recording::recover;
 use crate::recording::topic::Topic;
 use crate::recording::wire::DecodeError;
 use crate::recording::{frog, schema};
@@ -67,6 +68,18 @@ impl Player {
             found.push("bytes between its chunks are damaged; every message is there".into());
         }
         Ok(found)
+    }
+
+    /// Returns what was lost already when the file was recovered from a damaged one, one description for each recovery.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn lost_before_recovery(&mut self) -> Result<Vec<String>, RecordingError> {
+        let path = self.path.clone();
+        let read = self.container.metadata.clone().into_iter().map(|span| self.container.read_metadata(span));
+        let read: Vec<_> = read.collect::<Result<_, _>>().map_err(|source| RecordingError::Mcap { path, source })?;
+        let recoveries = read.into_iter().flatten().filter(|metadata| metadata.name == recover::RECOVERED);
+        Ok(recoveries.filter_map(|mut metadata| metadata.metadata.remove(recover::LOST)).collect())
     }
 
     /// Returns the reason for which the end of the file is missing; none for a finished file.

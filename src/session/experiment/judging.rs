@@ -9,6 +9,7 @@ use crate::telemetry::{Tick, TrialEnd};
 use crate::trial::{JudgedBy, JumpParameters, NOT_RECORDED, TrialRecord, Verdict, counted};
 
 const NOT_UNDER_REVIEW: &str = "no trial is under review";
+const DID_NOT_JUMP: &str = "the robot did not jump in this trial: judge it void, or run it again";
 
 impl Experiment {
     /// Measures the trial that has ended; it waits for its verdict then. `recorded` is its number of ticks: if some are
@@ -64,8 +65,8 @@ impl Experiment {
     }
 
     /// Judges the trial under review for the operator; with `rerun` its parameters are queued again.
-    /// Refused when no trial is under review, an accepted trial has no value, or a trial that tripped a limit is judged void
-    /// without a reason.
+    /// Refused when no trial is under review, an accepted trial has no value, a trial without a jump is not judged void, or one
+    /// that tripped a limit is judged void without a reason.
     pub fn judge(&mut self, verdict: Verdict, rerun: bool) -> Result<(), RequestRefusal> {
         self.judge_because(verdict, JudgedBy::Operator, rerun, "")
     }
@@ -91,6 +92,9 @@ impl Experiment {
     ) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
+        if verdict != Verdict::Void && row.did_not_jump() {
+            return not_now(DID_NOT_JUMP);
+        }
         if verdict == Verdict::Void && reason.is_empty() && objective::tripped_limit(row) {
             return not_now(format!(
                 "trial {trial} tripped a limit ({}), which is its parameters' outcome; to judge it void give the reason why they did not cause it",
@@ -172,13 +176,16 @@ impl Experiment {
     }
 
     /// Uses a value measured by hand for the trial under review; none returns to the measured one.
-    /// Refused when no trial is under review or the value is not finite.
+    /// Refused when no trial is under review, the value is not finite, or a value is given for a trial without a jump.
     pub fn set_hand_value(&mut self, value: Option<f64>) -> Result<(), RequestRefusal> {
         let trial = self.reviewed()?;
         if value.is_some_and(|value| !value.is_finite()) {
             return not_now("a measured value must be a finite number");
         }
         let Some(row) = self.rows.get_mut(&trial) else { return not_now(NOT_UNDER_REVIEW) };
+        if value.is_some() && row.did_not_jump() {
+            return not_now(DID_NOT_JUMP);
+        }
         let before = row.clone();
         row.hand_value = value;
         row.value = row.suggested.and_then(|suggested| value_of(row, suggested, &self.plan));

@@ -11,8 +11,8 @@ use crate::trial::{CHANGED, JudgedBy, Verdict};
 impl Experiment {
     /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
     /// sampler proposes again from the changed history; the operator's changes of the open proposal stay.
-    /// Refused during a trial, without a reason, for a trial that was not run, without a final verdict or with several rollouts, for the
-    /// verdict that it has, and for an accepted trial without a value.
+    /// Refused during a trial, without a reason, for a trial that was not run, did not jump, has no final verdict or several
+    /// rollouts, for the verdict that it has, and for an accepted trial without a value.
     pub fn change_verdict(&mut self, trial: u32, verdict: Verdict, reason: &str) -> Result<Verdict, RequestRefusal> {
         self.must_be_idle()?;
         let reason = reason.trim();
@@ -23,6 +23,9 @@ impl Experiment {
         let Some(before) = row.verdict else { return not_now(format!("trial {trial} has no verdict yet")) };
         if row.was_not_run() {
             return not_now(format!("trial {trial} was not run: it has no verdict"));
+        }
+        if row.did_not_jump() {
+            return not_now(format!("the robot did not jump in trial {trial}: it stays void"));
         }
         if before == verdict {
             return not_now(format!("trial {trial} is {} already", verdict.name()));

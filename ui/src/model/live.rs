@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::comparison::Comparison;
 use super::history::SignalHistory;
-use crate::series::Series;
+use crate::series::{SETS, Series};
 use crate::settings::ChartMode;
 
 /// State of the live view.
@@ -19,6 +19,8 @@ pub struct LiveView {
     pub panel: Panel,
     /// Drawn series, in the order of the charts.
     pub series: Vec<Series>,
+    /// The operator's own choice of series, of the settings or the list: a set beside those of the program.
+    pub chosen_series: Option<Vec<Series>>,
     /// The history at the moment of freezing, and that moment on the console's clock.
     pub frozen: Option<(SignalHistory, Duration)>,
     /// Time under the cursor while frozen, ns.
@@ -31,6 +33,21 @@ pub struct LiveView {
     pub present_in_review: bool,
     /// Time under the cursor on the trial that waits for its verdict, ns; none without a cursor.
     pub landed_cursor_ns: Option<u64>,
+}
+
+impl LiveView {
+    /// Draws `series`, and keeps it as the operator's choice if it is one.
+    pub fn choose(&mut self, series: Vec<Series>) {
+        if let Some(chosen) = own_choice(&series) {
+            self.chosen_series = Some(chosen);
+        }
+        self.series = series;
+    }
+}
+
+/// The series if they are none of the program's sets.
+pub fn own_choice(series: &[Series]) -> Option<Vec<Series>> {
+    (!SETS.contains(&series)).then(|| series.to_vec())
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

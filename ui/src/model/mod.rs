@@ -241,6 +241,7 @@ impl Model {
                 window_s: settings.chart_window_s,
                 cursor_line: !settings.low_bandwidth,
                 panel: Panel::Charts,
+                chosen_series: live::own_choice(&settings.chart_series),
                 series: settings.chart_series,
                 frozen: None,
                 cursor_ns: 0,

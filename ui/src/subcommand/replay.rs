@@ -202,6 +202,10 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         let [from_s, to_s] = [lost.from_ns, lost.to_ns].map(|time_ns| time_ns as f64 / 1e9);
         put_line!("  lost: {:.3} s from {from_s:.3} s to {to_s:.3} s ({})", (to_s - from_s).max(0.0), lost.reason);
     }
+    let lost_before = player.lost_before_recovery()?;
+    for lost in &lost_before {
+        put_line!("  recovered from a file that was not whole: {lost}");
+    }
     if written && extras.is_empty() && lacks_its_end_alone(&player) {
         put_line!("  a session still writes it");
         return Ok(true);
@@ -211,6 +215,13 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         put_line!("  {line}");
     }
     let whole = damage.is_none() && extras.is_empty();
-    put_line!("  {}", if whole { "whole".to_owned() } else { format!("{:.3} s lost", player.lost_ns() as f64 / 1e9) });
+    put_line!(
+        "  {}",
+        match (whole, lost_before.is_empty()) {
+            (true, true) => "whole".to_owned(),
+            (true, false) => "everything that was recovered is there".to_owned(),
+            (false, _) => format!("{:.3} s lost", player.lost_ns() as f64 / 1e9),
+        }
+    );
     Ok(whole)
 }

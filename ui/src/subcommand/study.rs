@@ -334,7 +334,10 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     if table.metadata().is_ok_and(|about| !about.is_file()) {
         return Err(refuse(&"it is not a regular file; give a table, *.csv or *.json"));
     }
-    let text = std::fs::read_to_string(table).map_err(|error| refuse(&error))?;
+    let text = std::fs::read_to_string(table).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => refuse(&"there is no such file; give a table, *.csv or *.json"),
+        _ => refuse(&format!("it cannot be read: {error}")),
+    })?;
     let trials = match format {
         TableFormat::Json => exchange::from_json(&text),
         _ => exchange::from_csv(&text),

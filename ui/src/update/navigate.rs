@@ -11,7 +11,7 @@ use crate::model::live::Panel;
 use crate::model::table_columns::{CellContent, shown_columns};
 use crate::model::trials::SortBy;
 use crate::model::{Model, View};
-use crate::series::SETS;
+use crate::series::{SETS, Series};
 use crate::settings::ChartMode;
 
 /// Moves through the rows of the open view; `isize::MIN` and `MAX` go to the ends.
@@ -111,17 +111,19 @@ pub(super) fn zoom(model: &mut Model, factor: f64) {
     model.live.window_s = (model.live.window_s * factor).clamp(1.0, 60.0);
 }
 
-/// The next set of series: attitude and feet, forces, motion of the trunk, torques of the joints, and the joints in numbers.
+/// The next set of series: attitude and feet, forces, motion of the trunk, torques of the joints, the operator's own choice, and
+/// the joints in numbers.
 pub(super) fn next_series(model: &mut Model) {
     let live = &mut model.live;
-    let shown = SETS.iter().position(|set| live.series == *set);
+    let sets: Vec<&[Series]> = SETS.into_iter().chain(live.chosen_series.as_deref()).collect();
+    let shown = sets.iter().position(|set| live.series == *set);
     let next = match (live.panel, shown) {
-        (Panel::Charts, Some(set)) => SETS.get(set + 1),
+        (Panel::Charts, Some(set)) => sets.get(set + 1),
         (Panel::Joints, _) => {
             live.panel = Panel::Robot;
             return;
         }
-        _ => SETS.first(),
+        _ => sets.first(),
     };
     match next {
         Some(set) => (live.panel, live.series) = (Panel::Charts, set.to_vec()),

@@ -110,7 +110,9 @@ pub(super) fn choice_key(model: &mut Model, key: Key, subject: Choice, mut selec
         KeyCode::Left | KeyCode::Right | KeyCode::Char('x') => match subject {
             Choice::Series => {
                 model.live.panel = Panel::Charts;
-                toggle(&mut model.live.series, selected);
+                let mut series = model.live.series.clone();
+                toggle(&mut series, selected);
+                model.live.choose(series);
             }
             Choice::Columns => toggle(&mut model.trial_table.columns, selected),
         },
