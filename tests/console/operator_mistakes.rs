@@ -285,10 +285,19 @@ fn another_shell_shows_a_verdict_that_can_still_be_taken_back() {
     let place = study.to_str().expect("a path");
     let show = quadfrog(folder.path(), &["study", "show", place]);
     assert!(show.contains(&format!("Trial {trial} waits for its verdict")) && !show.contains("running"), "{show}");
+    // Regression: a value by hand was not shown before the verdict.
+    session.send("=0.52\r");
+    session.wait_for(&["by hand"]);
+    let by_hand = format!("Trial {trial} waits for its verdict, by hand 0.520 m");
+    let show = || quadfrog(folder.path(), &["study", "show", place]);
+    session.wait_until("the value by hand is in the study", || show().contains(&by_hand));
     judge_as_suggested(&mut session, trial);
     let show = quadfrog(folder.path(), &["study", "show", place]);
     let best = show.lines().last().unwrap_or_default().to_owned();
-    assert!(best.starts_with("Best: trial ") && best.ends_with("accept") && !show.contains("running"), "{show}");
+    assert!(
+        best.starts_with("Best: trial ") && best.ends_with("accept, J by hand") && !show.contains("running"),
+        "{show}"
+    );
     assert!(show.contains("seed: 3") && !show.contains("seed 0"), "the sampler's seed is the study's: {show}");
     let list = quadfrog(folder.path(), &["study", "list", at.to_str().expect("a path")]);
     assert!(!list.lines().nth(1).unwrap_or_default().ends_with('-'), "{list}");

@@ -118,7 +118,7 @@ const REPLAY: &[Row] = &[
     row(Action::Open, "Enter", Changes, (")", "by number")),
     row(Action::Sort, "s", Shows("by value"), ("", "")),
     row(Action::Reverse, "S", Shows("by value reversed"), ("", "")),
-    row(Action::Filter, "F", Shows("only accept"), ("FFF", "all (F)")),
+    row(Action::Filter, "F", Shows("only accept"), ("FFFF", "all (F)")),
     row(Action::BestOnly, "b", Shows("best only"), ("b", "all (F)")),
     row(Action::Columns, "x", Shows("Columns of the trial table"), ("\x1b", "by value")),
     row(Action::Search, "/", Shows("Go to trial"), ("1\r", "by value")),

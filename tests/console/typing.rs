@@ -346,6 +346,10 @@ fn a_form_that_is_open_over_a_stop_says_first_how_it_is_kept() {
     assert_eq!(console.press(&["F12"]), [Effect::Stop]);
     console.mode(Mode::Damped);
     assert_eq!(last(&console), " STOPPED: Enter keeps the note, Esc drops it; then k acknowledges.");
+    // Regression: a half-written note went without its text.
+    let mut other = Console::review(Mode::Review, Verdict::Accept);
+    other.press(&["m", "n", "o", "Esc"]);
+    assert_eq!(other.said(), "cancelled: nothing was changed; dropped: no");
     let note = OperatorRequest::Note { trial: 0, text: "ok".into() };
     assert_eq!(console.requests(&["Enter", "k"]), [note, OperatorRequest::Acknowledge]);
     // Another person's STOP closes no form.

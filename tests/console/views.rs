@@ -7,7 +7,7 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::record::{Record, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Phase, Snapshot};
-use quadfrog::trial::{Displacement, DrawnRange, ExperimentStage, JumpRow, TrialRecord, Verdict};
+use quadfrog::trial::{Displacement, DrawnRange, ExperimentStage, JumpRow, SKIPPED, TrialRecord, Verdict};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::message::{Effect, ExportedRows, Mouse, Msg, ReplayStatus};
 use quadfrog_console::model::View;
@@ -367,6 +367,13 @@ fn the_filter_the_best_and_a_number_find_rows() {
     assert_eq!(numbers(&console), [1, 4, 7, 10]);
     console.press(&["F"]);
     assert_eq!(numbers(&console), [2, 5, 8, 11]);
+    // The proposals that were skipped, which the heading counts.
+    let mut skipped = trial(12, Some(Verdict::Void), None);
+    skipped.cause = SKIPPED.into();
+    console.record(Record::Trial(skipped));
+    console.press(&["F"]);
+    assert_eq!(numbers(&console), [12]);
+    assert_shows(&console.screen(120, 40), &["1 not run", "only not run (F)"]);
     console.press(&["F", "b"]);
     assert_eq!(numbers(&console), [9, 6, 3, 0], "each was the best so far");
     console.press(&["b", "/", "7", "Enter"]);

@@ -212,7 +212,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
 
         row(A::Sort, "sort", &["s"], G::Tables, "sort by the next: value, verdict, others from the left"),
         row(A::Reverse, "reverse", &["S"], G::Tables, "reverse the order"),
-        row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict; Log: only a level"),
+        row(A::Filter, "filter", &["F"], G::Tables, "Trials: only a verdict, or not run; Log: only a level"),
         row(A::Columns, "columns", &["x"], G::Tables, "choose the columns"),
         row(A::BestOnly, "best-only", &["b"], G::Tables, "only trials that were the best so far"),
         row(A::Search, "search", &["/"], G::Tables, "Trials: go to a trial by its number; Log: search the text"),

@@ -136,6 +136,38 @@ pub enum SortBy {
     Column(Column),
 }
 
+/// The only trials that the table shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrialFilter {
+    Verdict(Verdict),
+    NotRun,
+}
+
+impl TrialFilter {
+    /// The filter after this one; none after the last.
+    pub fn next(before: Option<TrialFilter>) -> Option<TrialFilter> {
+        let mut all = Verdict::ALL.into_iter().map(TrialFilter::Verdict).chain([TrialFilter::NotRun]);
+        match before {
+            None => all.next(),
+            Some(before) => all.skip_while(|filter| *filter != before).nth(1),
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            TrialFilter::Verdict(verdict) => verdict.name(),
+            TrialFilter::NotRun => "not run",
+        }
+    }
+
+    fn passes(self, trial: &TrialRecord) -> bool {
+        match self {
+            TrialFilter::Verdict(verdict) => has_verdict(trial, verdict),
+            TrialFilter::NotRun => trial.was_not_run(),
+        }
+    }
+}
+
 /// State of the trial table.
 #[derive(Debug, Clone, Default)]
 pub struct TrialTable {
@@ -144,7 +176,7 @@ pub struct TrialTable {
     pub sort: SortBy,
     /// Whether the order is reversed; rows without a value stay last.
     pub reversed: bool,
-    pub filter: Option<Verdict>,
+    pub filter: Option<TrialFilter>,
     /// Only trials that were the best when they ran.
     pub best_only: bool,
     /// The columns beside the number.
@@ -170,7 +202,7 @@ impl TrialTable {
             trials.best_so_far().collect()
         } else {
             let all = trials.records.values().chain(later);
-            all.filter(|trial| self.filter.is_none_or(|verdict| has_verdict(trial, verdict))).collect()
+            all.filter(|trial| self.filter.is_none_or(|filter| filter.passes(trial))).collect()
         };
         // A filter never hides the trial that waits for its verdict.
         let waits =

@@ -273,7 +273,9 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     }
     let unjudged = |trial: &&Trial| experiment::waits_for_verdict(trial);
     for trial in study.running().filter(unjudged) {
-        let _ = writeln!(text, "Trial {} waits for its verdict", trial.number);
+        let row = rows.iter().find(|row| row.trial == trial.number);
+        let by_hand = row.and_then(|row| row.hand_value).map(|value| format!(", by hand {value:.3} {unit}"));
+        let _ = writeln!(text, "Trial {} waits for its verdict{}", trial.number, by_hand.unwrap_or_default());
     }
     let undecided = |row: &&TrialRecord| row.verdict.is_none() && study.trial(row.trial).is_ok_and(|t| !unjudged(&t));
     let (running, waiting) = (rows.iter().filter(undecided).count(), study.waiting().count());

@@ -1,7 +1,6 @@
 //! Movement within the views: rows, pages, the charts' cursor, freezing, zooming, sorting and filtering.
 
 use quadfrog::recording::record::LogLevel;
-use quadfrog::trial::Verdict;
 use strum::VariantArray;
 
 use super::request::reply;
@@ -9,7 +8,7 @@ use crate::action::Action;
 use crate::column::Column;
 use crate::model::live::Panel;
 use crate::model::table_columns::{CellContent, shown_columns};
-use crate::model::trials::SortBy;
+use crate::model::trials::{SortBy, TrialFilter};
 use crate::model::{Model, View};
 use crate::series::{SETS, Series};
 use crate::settings::ChartMode;
@@ -169,7 +168,6 @@ pub(super) fn filter(model: &mut Model) {
             Some(_) => None,
         };
     } else {
-        let next = model.trial_table.filter.map_or(0, |verdict| verdict as usize + 1);
-        model.trial_table.filter = Verdict::ALL.get(next).copied();
+        model.trial_table.filter = TrialFilter::next(model.trial_table.filter);
     }
 }

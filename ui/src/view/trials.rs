@@ -72,7 +72,7 @@ fn summaries(model: &Model) -> Vec<String> {
     let view = &model.trial_table;
     let (shown, by_filter) = match (view.best_only, view.filter) {
         (true, _) => ("best only".to_owned(), Action::BestOnly),
-        (false, Some(verdict)) => (format!("only {}", verdict.name()), Action::Filter),
+        (false, Some(filter)) => (format!("only {}", filter.name()), Action::Filter),
         (false, None) => ("all".to_owned(), Action::Filter),
     };
     let sort = match view.sort {

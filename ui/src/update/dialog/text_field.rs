@@ -46,7 +46,15 @@ pub(super) fn key(
     }
     let mut selected = replaces && refused.is_some();
     match key.code() {
-        KeyCode::Esc => return cancelled(model, "nothing was changed"),
+        KeyCode::Esc => {
+            let typed = if replaces { "" } else { input.value().trim() };
+            return match purpose {
+                Purpose::Note(_) if !typed.is_empty() => {
+                    cancelled(model, &format!("nothing was changed; dropped: {typed}"))
+                }
+                _ => cancelled(model, "nothing was changed"),
+            };
+        }
         KeyCode::Enter if problem.is_some() => {
             problem = Some(match (input.value(), purpose) {
                 ("", Purpose::HandValue(trial)) if model.session.measured_objective_of(trial).is_some() => {
