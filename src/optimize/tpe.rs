@@ -5,11 +5,11 @@
 //! with the largest l(x)/g(x) is proposed. Running trials count as bad (constant liar), which keeps parallel workers
 //! apart. `docs/tpe.md` has the rules of Optuna 5.0 in full.
 
-use super::ask::{Ask, Candidate, Direction, Streams};
+use super::ask::{Ask, Candidate, Direction, SamplerConfig, Streams};
 use super::model_free::uniform;
 use super::mt19937::Mt19937;
 use super::parzen::Parzen;
-use super::space::{Parameter, Range};
+use super::space::{Parameter, Range, Space};
 use super::trial::{Trial, TrialState, value_of};
 use std::cmp::Ordering;
 
@@ -127,10 +127,15 @@ fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) ->
     columns
 }
 
+/// Returns whether the next point is drawn without the model: too few trials have been observed.
+pub fn starts_at_random(config: &SamplerConfig, trials: &[Trial], space: &Space) -> bool {
+    trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials(space)
+}
+
 /// Proposes the next point, parameter by parameter as Optuna asks for them.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     let Ask { config, trials, space, direction, .. } = *ask;
-    let startup = trials.iter().filter(|t| t.state.is_observed()).count() < config.startup_trials(space);
+    let startup = starts_at_random(config, trials, space);
     let mut parts: Option<TpeSplit<'_>> = None;
     let mut joint: Option<Vec<(String, f64)>> = None;
     let mut values = Vec::with_capacity(space.parameters().len());

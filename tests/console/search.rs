@@ -264,7 +264,7 @@ fn before_the_first_trials_both_densities_are_the_prior() {
     assert!(screen.contains("g=r") && !screen.contains("importance"), "{screen}");
 }
 
-/// Regression: after the last trial the view said "sampled without a model".
+/// Regression: after the last trial the view said "drawn without a model".
 #[test]
 fn the_reasons_for_the_last_proposal_stay_when_the_study_is_finished() {
     let mut console = Console::proposed();
@@ -274,7 +274,7 @@ fn the_reasons_for_the_last_proposal_stay_when_the_study_is_finished() {
     assert_shows(&console.screen(120, 40), &["TPE f0 (#12)", "importance 62 %", "g good"]);
 }
 
-/// Regression: a finished study that was continued said "sampled without a model" of its last trial.
+/// Regression: a finished study that was continued said "drawn without a model" of its last trial.
 #[test]
 fn a_continued_study_that_is_finished_has_no_reasons_of_a_proposal() {
     let mut console = Console::ready();

@@ -499,7 +499,11 @@ fn the_verdict_that_ended_a_confirmation_can_be_undone() {
 fn a_proposal_comes_with_its_densities_and_what_matters() {
     let mut experiment = experiment(40);
     let mut news = News::default();
-    for _ in 0..IMPORTANCE_TRIALS - 1 {
+    // Regression: densities stood beside a proposal of the random start, which they had not decided.
+    accept(&mut experiment);
+    told(&mut experiment, &mut news);
+    assert!(news.insight.as_ref().unwrap().parameters.iter().all(|p| p.at.is_empty()));
+    for _ in 1..IMPORTANCE_TRIALS - 1 {
         accept(&mut experiment);
     }
     told(&mut experiment, &mut news);

@@ -9,6 +9,7 @@ use crate::optimize::ask::{Prediction, SamplerKind};
 use crate::optimize::insight;
 use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
 use crate::optimize::study::{ModelPredictions, Study, TrialDraft};
+use crate::optimize::tpe;
 use crate::optimize::trial::Trial;
 use crate::trial::{
     ExpectedResult, FallRisk, Gains, ParameterInsight, ParameterValues, PredictedTrial, Proposal, ProposalInsight,
@@ -222,7 +223,8 @@ impl OpenProposal {
     pub fn insight(&self, model: &ModelPredictions) -> ProposalInsight {
         let (trials, options) = (self.study.trials(), self.study.options());
         let densities = match options.sampler.kind {
-            SamplerKind::Tpe => {
+            // The densities of a random start have decided nothing.
+            SamplerKind::Tpe if !tpe::starts_at_random(&options.sampler, trials, &options.space) => {
                 insight::densities(&options.sampler, trials, &options.space, options.direction, INSIGHT_POINTS)
             }
             _ => Vec::new(),

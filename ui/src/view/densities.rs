@@ -30,7 +30,7 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     };
     if !drawn && body.height > 0 {
         let reason = match (insight, &session.insight) {
-            (Some(_), _) => "sampled without a model",
+            (Some(_), _) => "drawn without a model",
             (None, Some(_)) => "no proposal in this session",
             (None, None) => "no proposal yet",
         };
