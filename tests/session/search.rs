@@ -446,6 +446,14 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     assert!(experiment.confirm_best(0).unwrap().is_empty());
     assert_eq!(experiment.stage(), ExperimentStage::Finished);
     assert!(experiment.confirm_best(0).unwrap_err().to_string().contains("no confirmation of the best is running"));
+    // Regression: the re-run of a repeat ran although the repeats had been called off.
+    experiment.confirm_best(4).unwrap();
+    let repeat = run(&mut experiment, TrialEnd::Settled).trial;
+    experiment.judge(Verdict::Void, true).unwrap();
+    assert_eq!(experiment.proposal().map(|proposal| proposal.parent), Some(Some(repeat)));
+    experiment.confirm_best(0).unwrap();
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    assert_eq!(experiment.row(repeat + 1).map(|row| row.was_not_run()), Some(true));
 }
 
 /// Regressions: a trial that was queued after the last repeat said the result again, and the result did not say that the later trial

@@ -24,14 +24,29 @@ impl Experiment {
     pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         self.must_be_queued(trial)?;
         let proposed = self.is_next(trial);
+        if !self.end_queued(trial)? {
+            return not_now(format!("trial {trial} has just begun elsewhere"));
+        }
+        self.propose_after_change(proposed)
+    }
+
+    /// Removes the queued repeats that confirm the best. One that has just begun elsewhere runs.
+    pub(super) fn remove_repeats(&mut self) -> Result<(), StudyError> {
+        let repeats: Vec<u32> =
+            self.study.waiting().filter(|trial| attributes::confirms(trial)).map(|trial| trial.number).collect();
+        for trial in repeats {
+            self.end_queued(trial)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a queued trial as removed. Returns whether it was still queued.
+    fn end_queued(&mut self, trial: u32) -> Result<bool, StudyError> {
         // Another program may have queued it, without an origin.
         let mut removed = Origin::of_trial(self.study.trial(trial)?).attributes();
         removed.extend(attributes::write(&RemovedAttributes { verdict: Verdict::Void, cause: REMOVED }));
         let waits = |trial: &Trial| trial.state == TrialState::Waiting;
-        if self.study.tell_if(trial, Outcome::Fail, &removed, &waits)? != TellOutcome::Recorded {
-            return not_now(format!("trial {trial} has just begun elsewhere"));
-        }
-        self.propose_after_change(proposed)
+        Ok(self.study.tell_if(trial, Outcome::Fail, &removed, &waits)? == TellOutcome::Recorded)
     }
 
     /// Exchanges a queued point with the one before it, or after it. Trials run in the order of their numbers: the points

@@ -212,7 +212,9 @@ impl Experiment {
             if confirmation::running(&self.study).is_none() {
                 return not_now("no confirmation of the best is running");
             }
+            // With the last verdict, which may be a re-run of a repeat.
             self.report_verdict()?;
+            self.remove_repeats()?;
             self.confirmation.abort(&mut self.study)?;
             self.propose()?;
             return Ok(Vec::new());
