@@ -7,6 +7,7 @@ use quadfrog::robot::{JOINTS, joint_name};
 use quadfrog::telemetry::{Mode, Phase, Snapshot, Tick};
 use quadfrog::trial::{Backend, ExperimentStage, Verdict};
 use quadfrog_console::message::Msg;
+use quadfrog_console::series::Series;
 use quadfrog_console::settings::{ConsoleSettings, DEFAULT};
 use quadfrog_console::theme::{Colours, Glyphs, Theme};
 
@@ -290,4 +291,16 @@ fn the_chosen_series_are_one_of_the_sets() {
         shows_the_choice(&mut console)
     });
     assert_eq!(again, Some(7), "joints, the robot and four sets are before it");
+}
+
+/// Regression: in a view without charts the keys of the charts changed those of Live, without a word.
+#[test]
+fn keys_of_the_charts_are_refused_where_no_chart_is_seen() {
+    let mut console = charting(&["roll"]);
+    console.press(&["6"]);
+    for key in ["t", "w", "+", "-"] {
+        console.press(&[key]);
+        assert_shows(console.said(), &["is not possible: the charts are in the view Live"]);
+    }
+    assert_eq!(console.model.live.series, [Series::Roll]);
 }

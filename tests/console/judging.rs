@@ -6,6 +6,7 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{FallCause, Mode, Phase, Snapshot, Tick, TransitionCause};
 use quadfrog::trial::{Backend, ExperimentStage, REMOVED, SKIPPED, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
+use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::text;
 use quadfrog_console::theme::Role;
 use ratatui::buffer::Cell;
@@ -669,4 +670,18 @@ fn the_question_before_a_jump_marks_changed_values() {
     console.press(&["g"]);
     let screen = console.screen(120, 40);
     assert_shows(&screen, &["Fx 80.00 N (was 75.00)", "(was 400.0)", "A countdown follows"]);
+}
+
+/// Regression: the key that acknowledges closed the details, and the next `q`, which was to close them, ended the program.
+#[test]
+fn the_details_stay_open_when_a_stop_is_acknowledged() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    console.mode(Mode::Damped);
+    console.press(&["2", "Enter"]);
+    assert_eq!(console.requests(&["k"]), [OperatorRequest::Acknowledge]);
+    console.mode(Mode::Disarmed);
+    assert!(matches!(console.model.dialog, Some(Dialog::Details { .. })), "{:?}", console.model.dialog);
+    assert_eq!(console.press(&["q"]), []);
+    assert!(console.model.dialog.is_none());
 }

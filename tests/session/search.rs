@@ -454,6 +454,7 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     experiment.confirm_best(0).unwrap();
     assert_eq!(experiment.stage(), ExperimentStage::Finished);
     assert_eq!(experiment.row(repeat + 1).map(|row| row.was_not_run()), Some(true));
+    assert!(experiment.remove_queued(repeat + 1).unwrap_err().to_string().contains("is not in the queue"));
 }
 
 /// Regressions: a trial that was queued after the last repeat said the result again, and the result did not say that the later trial

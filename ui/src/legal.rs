@@ -73,6 +73,8 @@ pub fn legal(action: Action, model: &Model) -> Legality {
                 || model.view == View::Trials && model.selected_trial().is_some();
             require(known, "no jump has been recorded yet")
         }
+        A::Series => require(matches!(model.view, View::Live | View::Health), "the charts are in the view Live"),
+        A::ChartMode | A::ZoomIn | A::ZoomOut => require(model.view == View::Live, "the charts are in the view Live"),
         A::Sort | A::Reverse | A::Columns | A::BestOnly | A::Copy | A::Export => {
             let reason =
                 if action == A::Copy { "it copies a row in the view Trials" } else { "only in the view Trials" };

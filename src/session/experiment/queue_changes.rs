@@ -2,6 +2,7 @@
 
 use super::Experiment;
 use super::attributes::{self, Origin, RemovedAttributes};
+use super::confirmation;
 use super::plan::{RequestRefusal, not_now};
 use crate::optimize::study::{Outcome, Study, StudyError, TellOutcome};
 use crate::optimize::trial::{Trial, TrialState};
@@ -20,7 +21,7 @@ pub struct QueuePlace {
 
 impl Experiment {
     /// Removes a queued point: its trial becomes void, which the sampler does not see, and it never runs.
-    /// Refused during a trial, for a trial that is not queued, and for a repeat that confirms the best.
+    /// Refused during a trial, for a trial that is not queued, and for a repeat of a running confirmation of the best.
     pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
         self.must_be_queued(trial)?;
         let proposed = self.is_next(trial);
@@ -51,7 +52,8 @@ impl Experiment {
 
     /// Exchanges a queued point with the one before it, or after it. Trials run in the order of their numbers: the points
     /// change places, the numbers stay. Returns the new place of the point.
-    /// Refused during a trial, for a trial that is not queued, at the ends of the queue, and for a repeat that confirms the best.
+    /// Refused during a trial, for a trial that is not queued, at the ends of the queue, and for a repeat of a running
+    /// confirmation of the best.
     pub fn move_queued(&mut self, trial: u32, earlier: bool) -> Result<QueuePlace, RequestRefusal> {
         self.must_be_queued(trial)?;
         let waiting: Vec<u32> = self.study.waiting().map(|trial| trial.number).collect();
@@ -115,7 +117,7 @@ impl Experiment {
         let Some(queued) = self.study.waiting().find(|waiting| waiting.number == trial) else {
             return not_now(format!("trial {trial} is not in the queue"));
         };
-        if attributes::confirms(queued) {
+        if attributes::confirms(queued) && confirmation::running(&self.study).is_some() {
             return not_now(format!("trial {trial} confirms the best; end the repeats instead"));
         }
         Ok(())

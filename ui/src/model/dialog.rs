@@ -183,7 +183,7 @@ impl Purpose {
             Purpose::HandValue(_) | Purpose::Bounds { .. } => Some("0123456789.,+-e"),
             Purpose::Continue | Purpose::Fix { .. } | Purpose::ConfirmBest | Purpose::TrialNumber => Some("0123456789"),
             Purpose::Beside => Some("0123456789#"),
-            Purpose::Seek => Some("0123456789.,:# abcdefghijklmnopqrstuvwxyz"),
+            Purpose::Seek => Some("0123456789.,:# abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"),
             Purpose::Note(_)
             | Purpose::VoidReason { .. }
             | Purpose::ChangeVerdict { .. }

@@ -80,7 +80,7 @@ enum StudySubcommand {
         #[arg(long, value_name = "DIR")]
         config: Option<PathBuf>,
     },
-    /// Queue a point: it is proposed next, also by a running session
+    /// Queue a point: it is proposed after those that are queued already, also by a running session
     Enqueue {
         #[command(flatten)]
         study: StudySelector,

@@ -33,6 +33,10 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         _ => None,
     };
     if let Some(action) = action {
+        // Nothing that is read changes: the key that closes the details would end the program if they were gone.
+        if action == Action::Acknowledge && matches!(dialog, Dialog::Details { .. }) {
+            model.dialog = Some(dialog);
+        }
         return KeyOutcome::Perform(action);
     }
     KeyOutcome::Effects(match dialog {

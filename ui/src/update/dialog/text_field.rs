@@ -184,6 +184,7 @@ fn is_doubted(model: &Model, value: f64) -> bool {
 
 /// The place that a text names: a time or a trial.
 fn seek(model: &Model, text: &str) -> Result<ReplayCommand, String> {
+    let text = &*text.to_lowercase();
     if text == "fall" {
         return Ok(ReplayCommand::NextFall);
     }
