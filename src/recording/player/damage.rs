@@ -71,15 +71,12 @@ impl Player {
     }
 
     /// Returns what was lost already when the file was recovered from a damaged one, one description for each recovery.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn lost_before_recovery(&mut self) -> Result<Vec<String>, RecordingError> {
-        let path = self.path.clone();
-        let read = self.container.metadata.clone().into_iter().map(|span| self.container.read_metadata(span));
-        let read: Vec<_> = read.collect::<Result<_, _>>().map_err(|source| RecordingError::Mcap { path, source })?;
-        let recoveries = read.into_iter().flatten().filter(|metadata| metadata.name == recover::RECOVERED);
-        Ok(recoveries.filter_map(|mut metadata| metadata.metadata.remove(recover::LOST)).collect())
+    /// [`Player::check_extras`] names metadata that cannot be read.
+    pub fn lost_before_recovery(&mut self) -> Vec<String> {
+        let spans = self.container.metadata.clone();
+        let read = spans.into_iter().filter_map(|span| self.container.read_metadata(span).ok().flatten());
+        let recoveries = read.filter(|metadata| metadata.name == recover::RECOVERED);
+        recoveries.filter_map(|mut metadata| metadata.metadata.remove(recover::LOST)).collect()
     }
 
     /// Returns the reason for which the end of the file is missing; none for a finished file.
