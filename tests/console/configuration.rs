@@ -120,7 +120,9 @@ fn a_new_configuration_is_valid_and_differs_in_nothing_until_it_is_edited() {
     assert_eq!(differences, "safety.toml  parameters.Fx: [0.0, 200.0] -> [0.0, 400.0]\n");
     let back = "safety.toml  parameters.Fx: [0.0, 400.0] -> [0.0, 200.0]\n";
     program.write("empty/safety.toml", "");
-    assert_eq!(program.text(&["config", "diff", "empty", "home/quadfrog"]), back);
+    // Regression: of two folders the values went from the second to the first.
+    assert_eq!(program.text(&["config", "diff", "home/quadfrog", "empty"]), back);
+    assert_eq!(program.text(&["config", "diff", "empty", "home/quadfrog"]), differences);
     // Regression: `--config` of the other commands was an error.
     assert_eq!(program.text(&["config", "diff", "--config", "home/quadfrog"]), differences);
     // Regression: of the three commands about a configuration one did not take the option of all others.

@@ -201,20 +201,22 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
         session.send(key);
         session.wait_for(&[time]);
     }
+    // Regression: they led to the countdown of the trial that fell, and within that trial nowhere.
+    let fallen = |trial| shown(span(trial).end_ns - 1_000_000);
     session.send("(");
     for trial in falls() {
         session.send("}");
-        session.wait_for(&[&shown(span(trial).begin_ns)]);
+        session.wait_for(&[&fallen(trial)]);
     }
     // After the last one it stays there and says so.
     session.send("}");
-    session.wait_for(&["no further fall or fault", &shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.wait_for(&["no further fall or fault", &fallen(*falls().last().unwrap())]);
     session.send(")");
     session.wait_for(&[&shown(timeline().duration_ns())]);
     session.send("]");
     session.wait_for(&["no further trial or fault", &shown(timeline().duration_ns())]);
     session.send("{");
-    session.wait_for(&[&shown(span(*falls().last().unwrap()).begin_ns)]);
+    session.wait_for(&[&fallen(*falls().last().unwrap())]);
     session.send("([");
     session.wait_for(&["no earlier trial or fault", "00:00.000"]);
 }

@@ -220,13 +220,13 @@ impl ReplayFeed {
         run.map_or(marker.time_ns, |run| run.row_ns)
     }
 
-    /// Begins of faults and of trials that fell.
-    fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + '_ {
-        let falls = self.recording.markers().iter().filter(|marker| match marker.kind {
-            MarkerKind::Trial(trial) => self.whole.falls.contains(&trial),
-            MarkerKind::Fault => true,
-        });
-        falls.map(|marker| self.place_of(marker))
+    /// Begins of faults and last ticks of trials that fell, in the order of time.
+    fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + use<> {
+        let faults = self.recording.markers().iter().filter(|marker| marker.kind == MarkerKind::Fault);
+        let fell = self.whole.trials.iter().filter(|run| self.whole.falls.contains(&run.trial));
+        let mut places: Vec<u64> = faults.map(|marker| marker.time_ns).chain(fell.map(last_tick)).collect();
+        places.sort_unstable();
+        places.into_iter()
     }
 
     /// The time before which a place counts as previous: during playback one passed less than 1 s ago is skipped.
@@ -433,6 +433,11 @@ fn after(mut times: impl Iterator<Item = u64>, time_ns: u64) -> Option<u64> {
 
 fn before(times: impl DoubleEndedIterator<Item = u64>, time_ns: u64) -> Option<u64> {
     times.rev().find(|time| *time < time_ns)
+}
+
+/// At the end itself the next trial may have begun.
+fn last_tick(run: &TrialRun) -> u64 {
+    run.end_ns.saturating_sub(TICK_NS).max(run.begin_ns)
 }
 
 /// The begin of a loop: shortly before the impulse, or the begin of a trial whose impulse is not recorded as an event.

@@ -39,12 +39,12 @@ enum ConfigSubcommand {
         #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
         model: String,
     },
-    /// Show the values that differ: of the configuration in force from the built-in one, or of two folders
+    /// Show the values that differ: from the built-in configuration to that in force, or from one folder to another
     Diff {
         /// Folder of a configuration [default: the configuration in force]
         #[arg(value_name = "DIR")]
         folder: Option<PathBuf>,
-        /// Folder to compare with [default: the built-in configuration]
+        /// Folder with the new values, those of DIR being the old ones [default: DIR beside the built-in configuration]
         #[arg(value_name = "OTHER")]
         other: Option<PathBuf>,
         /// DIR, as for other commands
@@ -155,8 +155,9 @@ fn show(what: &[String], folder: Option<&Path>, model: &str) -> Result<(), Failu
 }
 
 fn differences(folder: Option<&Path>, other: Option<&Path>, model: &str) -> Result<(), Failure> {
-    let new = load_config_for(&load_model(model)?.0, folder)?;
-    let old = Config::load(other)?;
+    let given = load_config_for(&load_model(model)?.0, folder)?;
+    let compared = Config::load(other)?;
+    let (old, new) = if other.is_some() { (given, compared) } else { (compared, given) };
     let (new_values, old_values) = (values(&new)?, values(&old)?);
     let mut equal = true;
     for Setting { file, key, value } in &new_values {
