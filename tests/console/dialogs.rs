@@ -280,6 +280,18 @@ fn the_title_of_the_arming_checks_is_whole_in_a_narrow_terminal() {
     assert_shows(&line_with(&screen, "Arming checks at "), &["PgUp PgDn"]);
 }
 
+/// Regression: during a fault a confirmation was answered as done, and the row went on saying that it was not.
+#[test]
+fn a_list_of_an_earlier_time_takes_no_confirmation() {
+    let mut console = long_checks();
+    console.mode(Mode::Disarmed);
+    console.press(&["P"]);
+    assert_eq!(console.requests(&["x"]).len(), 1);
+    console.mode(Mode::Fault);
+    assert_eq!(console.requests(&["x"]), []);
+    assert_shows(console.said(), &["not confirmed: the list is of an earlier time"]);
+}
+
 /// Regression: before the first answer of the robot the heading named a time of checks that had not been, and no count.
 #[test]
 fn the_title_of_arming_checks_that_have_not_been_names_no_time() {

@@ -191,6 +191,11 @@ pub(super) fn arming_checks_key(
         KeyCode::Char('x') if simulated => {
             reply(model, LogLevel::Info, "the simulator needs no confirmation");
         }
+        // The list would not show it.
+        KeyCode::Char('x') if model.arming_checks_are_past() => {
+            let reason = "the list is of an earlier time; the checks run while the robot is disarmed";
+            effects = refused(model, "not confirmed", reason);
+        }
         KeyCode::Up => (selected, scroll) = (selected.saturating_sub(1), 0),
         KeyCode::Down => (selected, scroll) = ((selected + 1).min(last), 0),
         KeyCode::PageUp => scroll = scroll.saturating_sub(CHECKS_PAGE).max(1),
