@@ -290,6 +290,9 @@ fn a_list_of_an_earlier_time_takes_no_confirmation() {
     console.mode(Mode::Fault);
     assert_eq!(console.requests(&["x"]), []);
     assert_shows(console.said(), &["not confirmed: the list is of an earlier time"]);
+    // Without a list nothing is of an earlier time.
+    console.record(Record::ArmingChecks(Vec::new()));
+    assert_eq!(console.requests(&["x"]).len(), 1);
 }
 
 /// Regression: before the first answer of the robot the heading named a time of checks that had not been, and no count.

@@ -154,6 +154,5 @@ fn result(model: &Model) -> String {
 
 /// The time of the checks once the robot is armed; none of checks that have not been.
 fn checked_at(model: &Model) -> Option<String> {
-    let past = model.arming_checks_are_past() && !model.session.arming_checks.is_empty();
-    past.then(|| wall_clock(model, model.session.arming_checked_ns))
+    model.arming_checks_are_past().then(|| wall_clock(model, model.session.arming_checked_ns))
 }

@@ -312,7 +312,7 @@ impl Model {
 
     /// Whether the arming checks are those of an earlier time: they run while the robot is disarmed.
     pub fn arming_checks_are_past(&self) -> bool {
-        self.mode() != Mode::Disarmed
+        self.mode() != Mode::Disarmed && !self.session.arming_checks.is_empty()
     }
 
     /// Whether an observer's STOP is in force.
