@@ -157,6 +157,11 @@ impl Container {
         Ok(true)
     }
 
+    /// Returns whether the end of the data is missing, and not the index behind it alone.
+    pub fn lacks_data_at_its_end(&self) -> bool {
+        self.cut.is_some() && self.data_end.is_none()
+    }
+
     /// Scans what was appended since the last scan; only of a file whose chunks were found by scanning.
     pub fn scan_appended(&mut self) -> Result<(), RecordingError> {
         let end = self.file.seek(SeekFrom::End(0)).map_err(McapError::Io);

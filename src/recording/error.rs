@@ -13,6 +13,8 @@ pub enum RecordingError {
     Missing { path: PathBuf },
     #[error("{}: exists already and is not overwritten; move it away or choose another name", path.display())]
     Exists { path: PathBuf },
+    #[error("{}: another program recovers into this file; wait until it has ended", path.display())]
+    Recovering { path: PathBuf },
     #[error("{}: the name of a finished recording must end in .mcap", path.display())]
     Name { path: PathBuf },
     #[error("{}: not a regular file; name a recording, *.mcap or *.mcap.part, that can be read from any place", path.display())]

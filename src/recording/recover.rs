@@ -1,7 +1,7 @@
 //! Recovery of a recording that was not finished or is damaged.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -71,7 +71,18 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
         let path = path.to_path_buf();
         move |source: io::Error| RecordingError::Io { path, doing, source }
     };
-    let file = File::create(&unfinished).map_err(io("create the file", &unfinished))?;
+    // Of two recoveries into one file the second is refused, before it would empty what the first writes.
+    let file = File::options().write(true).create(true).truncate(false).open(&unfinished);
+    let file = file.map_err(io("create the file", &unfinished))?;
+    file.try_lock().map_err(|error| match error {
+        TryLockError::WouldBlock => RecordingError::Recovering { path: unfinished.clone() },
+        TryLockError::Error(source) => io("lock the file", &unfinished)(source),
+    })?;
+    if target.exists() {
+        // The first has ended meanwhile, and this is its file.
+        return Err(exists());
+    }
+    file.set_len(0).map_err(io("create the file", &unfinished))?;
     let result = Output::new(Box::new(file)).and_then(|out| RecordCopier::new(out).all(&mut container));
     let result = result.map_err(|error| match error {
         McapError::Io(source) => RecordingError::Io { path: unfinished.clone(), doing: "write", source },

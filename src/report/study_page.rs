@@ -165,8 +165,9 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
             .to_owned(),
         (false, 0) => format!("{recorded}."),
         (false, _) => format!(
-            "{recorded}; those of trial {missing} are missing: its motion, torque and power cannot be drawn. `quadfrog \
-             optimize --record all` and the console record the ticks of every trial."
+            "{recorded}; those of trial {missing} are missing: its motion, torque and power cannot be drawn. They were not \
+             recorded (`quadfrog optimize --record all` and the console record every trial), or are in a file that is damaged or \
+             was taken away."
         ),
     };
     text + &end

@@ -112,6 +112,13 @@ pub struct MeasuredJump {
     pub jumps: Vec<JumpRow>,
 }
 
+impl MeasuredJump {
+    /// Returns whether the robot was still in the air when the trial ended.
+    pub fn ended_in_the_air(&self) -> bool {
+        self.flights > 0 && self.touchdown.is_none()
+    }
+}
+
 /// One rollout of a trial that has several.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]

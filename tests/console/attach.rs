@@ -156,7 +156,15 @@ fn a_stopped_session_looks_old_and_its_stop_unconfirmed() {
     session.signal(Signal::SIGSTOP);
     watcher.wait_for(&["OLD: nothing new for"]);
     watcher.send(" ");
-    watcher.wait_for(&["STOP NOT CONFIRMED"]);
+    // Regression: the last line said that STOP reaches the robot at once.
+    watcher.wait_for(&["STOP NOT CONFIRMED", "STOP is not confirmed: the session does not answer."]);
+    // Regression: they said below the line about this session that no session runs.
+    let number = session.pid().to_string();
+    let stopped = lab.command(&["sessions"]);
+    let printed = String::from_utf8_lossy(&stopped.stderr).into_owned();
+    assert!(printed.contains(&format!("kill -CONT {number}")) && !printed.contains("no session runs"), "{printed}");
+    let refused = refusal(&lab.command(&["attach", &number]));
+    assert!(refused.contains(&format!("{number}: no session answers")), "{refused}");
     session.signal(Signal::SIGCONT);
     watcher.wait_until("it is confirmed", || !watcher.screen().contains("NOT CONFIRMED"));
     watcher.send("q");

@@ -241,6 +241,35 @@ fn a_whole_recording_is_not_recovered_and_a_damaged_one_names_how_its_study_read
     assert_shows(&refused, &["nothing.part: there is no such file"]);
 }
 
+/// Regression: two that began at once wrote into one unfinished file.
+#[test]
+fn of_two_recoveries_into_one_file_the_second_is_refused() {
+    let program = Program::new();
+    cut(&program);
+    program.write("cut.mcap.recovering", "what the first has written");
+    let first = fs::File::options().write(true).open(program.path("cut.mcap.recovering")).unwrap();
+    first.lock().unwrap();
+    let refused = program.refused(&["recover", "cut.mcap.part"]);
+    assert_shows(&refused, &["cut.mcap.recovering: another program recovers into this file"]);
+    assert_eq!(fs::read_to_string(program.path("cut.mcap.recovering")).unwrap(), "what the first has written");
+    // What a killed one has left is written over.
+    drop(first);
+    program.text(&["recover", "cut.mcap.part"]);
+    assert!(program.path("cut.mcap").exists() && !program.path("cut.mcap.recovering").exists());
+}
+
+/// Regression: of a file that was cut off "0.000 s lost" was said.
+#[test]
+fn the_check_of_a_file_that_was_cut_off_says_from_when_on_it_is_lost() {
+    let program = Program::new();
+    cut(&program);
+    let output = program.run(&["replay", "--check", "cut.mcap.part"]);
+    assert_eq!(output.status.code(), Some(1));
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert_shows(&printed, &["it was cut off", "lost: what followed ", " s, and nothing tells how much that was"]);
+    assert!(!printed.contains("0.000 s lost"), "{printed}");
+}
+
 #[test]
 fn a_recovery_that_does_not_fit_names_its_cause_and_leaves_nothing() {
     let program = Program::new();

@@ -1,6 +1,7 @@
 //! `quadfrog study` on stored studies.
 
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -230,6 +231,24 @@ fn a_table_that_is_imported_twice_is_no_repeat() {
     assert!(program.text(&["study", "import", &study, "hand.csv"]).starts_with("2 trials"));
     let printed = program.text(&["study", "import", &study, "hand.csv"]);
     assert!(printed.starts_with("0 trials") && printed.contains("2 were there already"), "{printed}");
+}
+
+/// Regression: a point that was removed from the queue came again as a trial without values, and was queued as one.
+#[test]
+fn a_removed_point_is_not_imported() {
+    let (program, study) = study("forward");
+    program.text(&["study", "enqueue", &study, "Fx=60"]);
+    // The line that the console writes of a point that is removed.
+    let removed = r#"{"op_code":6,"worker_id":"w","trial_id":6,"state":3,"values":null,"datetime_complete":"2026-11-27T14:26:21.127202+00:00"}"#;
+    let mut journal = fs::OpenOptions::new().append(true).open(Path::new(&study).join("study.log")).unwrap();
+    writeln!(journal, "{removed}").unwrap();
+    let shown = program.text(&["study", "show", &study]);
+    program.text(&["study", "export", &study, "--output", "own.csv"]);
+    let printed = program.text(&["study", "import", &study, "own.csv"]);
+    assert_shows(&printed, &["0 trials imported", "6 were there already", "1 row without parameters left out"]);
+    assert_eq!(program.text(&["study", "show", &study]), shown);
+    let printed = program.text(&["study", "import", &study, "own.csv", "--queue"]);
+    assert_shows(&printed, &["6 points queued; 1 row without parameters left out"]);
 }
 
 /// Regression: the budget of the configuration replaced the stored one.

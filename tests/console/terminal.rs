@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::pty::Session;
-use nix::sys::signal::Signal;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use portable_pty::CommandBuilder;
 use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE};
 use quadfrog::optimize::trial::{Trial, TrialState};
@@ -240,6 +241,75 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
     session.send("qy");
     assert!(session.wait().success());
     assert!(session.restored() && session.cooked());
+}
+
+/// The console as a job of a shell, armed, and its process.
+fn job_of_a_shell(folder: &Path) -> (Session, Pid) {
+    let mut shell = CommandBuilder::new("bash");
+    shell.args(["--norc", "--noprofile", "-i"]);
+    shell.env("PS1", "shell> ");
+    let mut session = Session::run(folder, SIZE, shell);
+    session.wait_for(&["shell>"]);
+    session.send(&format!("{} --output .\r", env!("CARGO_BIN_EXE_quadfrog")));
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    let children = format!("/proc/{0}/task/{0}/children", session.pid());
+    let console = std::fs::read_to_string(children).expect("the shell's child").trim().parse().expect("a number");
+    (session, Pid::from_raw(console))
+}
+
+/// Regression: the shell had given the terminal its own mode, and STOP arrived with the next Enter.
+#[test]
+fn stop_works_after_a_shell_had_the_terminal() {
+    let folder = folder();
+    let (mut session, console) = job_of_a_shell(folder.path());
+    kill(console, Signal::SIGSTOP).unwrap();
+    session.wait_for(&["Stopped"]);
+    session.send("fg\r");
+    session.wait_until("the whole screen is drawn again", || {
+        let screen = session.screen();
+        screen.contains("READY") && screen.contains("STOP  Space F12") && !screen.contains("Stopped")
+    });
+    session.send(" ");
+    session.wait_for(&["DAMPED"]);
+    session.send("k");
+    session.wait_for(&["Press A to arm"]);
+    // Another program changes the mode while the console has the terminal.
+    let terminal = std::fs::File::open(format!("/proc/{console}/fd/0")).unwrap();
+    assert!(std::process::Command::new("stty").arg("sane").stdin(terminal).status().unwrap().success());
+    session.wait_until("the mode is restored", || !session.cooked());
+    session.send("?");
+    session.wait_for(&["Keys"]);
+    session.send("\x1b");
+    session.wait_until("the help is closed", || !session.screen().contains("Keys"));
+    session.send("q");
+    session.wait_for(&["The study and its recording are in", "shell>"]);
+    session.send("exit\r");
+    session.wait();
+}
+
+/// A console in the background neither reads nor draws, is not stopped for it, and does not count as a present operator.
+#[test]
+fn a_console_in_the_background_runs_on_and_its_robot_sits_down() {
+    let folder = folder();
+    let (mut session, console) = job_of_a_shell(folder.path());
+    kill(console, Signal::SIGSTOP).unwrap();
+    session.wait_for(&["Stopped"]);
+    session.send("clear; bg\r");
+    session.send("echo a$((1+1))b\r");
+    session.wait_for(&["a2b"]);
+    let state = || std::fs::read_to_string(format!("/proc/{console}/stat")).unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(!state().contains(") T "), "{}", state());
+    assert!(!session.screen().contains("READY"), "{}", session.screen());
+    session.send("fg\r");
+    session.wait_for(&["STOP  Space F12", "Press A to arm"]);
+    session.send("q");
+    session.wait_for(&["The study and its recording are in"]);
+    session.send("exit\r");
+    session.wait();
+    assert!(entered(&player(folder.path()), Mode::SitDown) > 0.0);
 }
 
 #[test]

@@ -290,7 +290,14 @@ fn a_followed_recording_says_how_old_what_it_shows_is() {
         }
     }
     let silent = followed(0, 7, true).screen(120, 40);
-    assert_shows(&silent, &["OLD: nothing new for 7 s", "Nothing new for 7 s. STOP reaches its robot at once."]);
+    // Regression: it said that STOP reaches the robot of a session that stood still.
+    let doubt = "Nothing new for 7 s. The session may hang: STOP reaches its robot once it is confirmed.";
+    assert_shows(&silent, &["OLD: nothing new for 7 s", doubt]);
+    // Regression: below 60x20 a replay said that STOP works.
+    for (watched, works) in [(true, true), (false, false)] {
+        let screen = followed(0, 0, watched).screen(50, 15);
+        assert_eq!((screen.contains("STOP works"), screen.contains("no robot to stop")), (works, !works), "{screen}");
+    }
     // The first key beside the sentence is the way out.
     let last = followed(0, 0, true).screen(100, 30).lines().last().unwrap().to_owned();
     assert_shows(&last, &["q quit"]);

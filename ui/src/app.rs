@@ -24,6 +24,7 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::{Feed, read_best_jump};
+use crate::foreground::in_foreground;
 use crate::graphics::GraphicsSupport;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
@@ -136,6 +137,8 @@ struct Console {
     last_frame: Option<Instant>,
     last_feed: Instant,
     redraw: bool,
+    /// A shell has, or had, the terminal since the console configured it.
+    terminal_lost: bool,
     /// End of the wait for the terminal's report of its background.
     background_due: Option<Instant>,
     ended: Option<ConsoleExit>,
@@ -192,6 +195,7 @@ impl Console {
             last_frame: None,
             last_feed: now,
             redraw: true,
+            terminal_lost: false,
             background_due: asks.then(|| now + BACKGROUND_WAIT),
             ended: None,
         })
@@ -207,9 +211,11 @@ impl Console {
         let mut hung_up = signal(SignalKind::hangup())?;
         let mut resized = signal(SignalKind::window_change())?;
         let mut suspended = signal(SignalKind::from_raw(Signal::SIGTSTP as i32))?;
+        let mut continued = signal(SignalKind::from_raw(Signal::SIGCONT as i32))?;
         let mut pulse = interval(PULSE.min(self.frame_period));
         pulse.set_missed_tick_behavior(MissedTickBehavior::Skip);
         while self.ended.is_none() {
+            self.hold_terminal();
             self.beat();
             tokio::select! {
                 biased;
@@ -222,6 +228,7 @@ impl Console {
                 }
                 _ = resized.recv() => self.resize(),
                 _ = suspended.recv() => self.update_with([Msg::Suspend]),
+                _ = continued.recv() => self.terminal_lost = true,
                 _ = pulse.tick() => {}
             }
             if let Some(thread) = terminal::panicked() {
@@ -236,10 +243,28 @@ impl Console {
         self.end_session(&mut inputs)
     }
 
-    /// Sends the operator heartbeat while the connection is alive, and reports its loss and its return.
+    /// Configures the terminal again after a shell or another program had it. In the background nothing is drawn.
+    fn hold_terminal(&mut self) {
+        if !in_foreground() {
+            self.terminal_lost = true;
+        } else if self.terminal_lost || self.screen.mode_was_changed() {
+            self.terminal_lost = false;
+            if self.screen.configure().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
+                self.hang_up();
+            }
+            update(&mut self.model, Msg::Resumed);
+            self.redraw = true;
+        }
+    }
+
+    /// Sends the operator heartbeat while the console is in the foreground and the connection is alive, and reports its loss and its
+    /// return.
     fn beat(&mut self) {
         let connected = self.connection.alive();
-        if connected && let Some(handle) = self.feed.handle() {
+        if connected
+            && !self.terminal_lost
+            && let Some(handle) = self.feed.handle()
+        {
             handle.send_heartbeat();
         }
         if connected != self.connected {
@@ -374,12 +399,8 @@ impl Console {
         self.screen.release();
         // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);
-        if self.screen.configure().and_then(|()| self.screen.mouse(self.model.mouse)).is_err() {
-            self.hang_up();
-        }
-        update(&mut self.model, Msg::Resumed);
+        self.terminal_lost = true;
         self.last_feed = Instant::now();
-        self.redraw = true;
     }
 
     fn hang_up(&mut self) {
@@ -395,7 +416,7 @@ impl Console {
         // A quarter of the loop period early, so that a frame is not delayed by one whole period.
         let due = self.redraw || self.last_frame.is_none_or(|last| last.elapsed() + PULSE / 4 >= self.frame_period);
         let waits = self.background_due.is_some_and(|due| Instant::now() < due);
-        if !due || waits || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
+        if !due || waits || self.terminal_lost || !self.screen.ready() || self.ended == Some(ConsoleExit::HungUp) {
             return Ok(());
         }
         if self.screen.broken() {

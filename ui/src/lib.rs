@@ -20,6 +20,7 @@ pub mod connection;
 mod draw;
 pub mod export;
 pub mod feed;
+mod foreground;
 pub mod graphics;
 mod help;
 pub mod input;

@@ -70,13 +70,11 @@ fn is_same(row: &TableTrial, trial: &Trial) -> bool {
     let value = row.value.filter(|_| row.state != TrialState::Fail);
     let point = row.parameters.len() == trial.parameters.len()
         && row.parameters.iter().all(|(name, value)| trial.parameter(name) == Some(*value));
-    let microseconds = |at: Option<Timestamp>| at.map(Timestamp::as_microsecond);
-    let times = match (row.started.or(row.completed), row.completed.or(row.started)) {
-        (None, None) => true,
-        (started, completed) => {
-            microseconds(started) == microseconds(trial.started)
-                && microseconds(completed) == microseconds(trial.completed)
-        }
+    // One of two times stands for both, as it does for what is imported: a queued trial that was removed has never begun.
+    let times_of = |started: Option<Timestamp>, completed: Option<Timestamp>| {
+        [started.or(completed), completed.or(started)].map(|at| at.map(Timestamp::as_microsecond))
     };
+    let given = times_of(row.started, row.completed);
+    let times = given == [None, None] || given == times_of(trial.started, trial.completed);
     row.state == trial.state && value == trial.value && point && times
 }

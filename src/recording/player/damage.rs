@@ -84,6 +84,11 @@ impl Player {
         self.container.cut.as_deref()
     }
 
+    /// Returns whether more may have followed what is there: the end of the data is missing.
+    pub fn lacks_data_at_its_end(&self) -> bool {
+        self.container.lacks_data_at_its_end()
+    }
+
     /// Returns whether the file was completed: it has an end, though perhaps a damaged one.
     pub fn is_complete(&self) -> bool {
         self.container.cut.is_none()

@@ -16,8 +16,11 @@ use quadfrog::realtime::channel::StopLatch;
 
 pub use decoder::{Decoder, TerminalEvent};
 
+use crate::foreground::in_foreground;
 use crate::keymap::Key;
 
+/// Period in which a console in the background looks whether it has its terminal again.
+const BACKGROUND_PERIOD: Duration = Duration::from_millis(50);
 /// Wait for the rest of a sequence after a lone ESC. A terminal sends a sequence at once; a person is slower.
 const ESCAPE_WAIT: Duration = Duration::from_millis(20);
 /// Wait for the rest of any other sequence.
@@ -137,6 +140,7 @@ pub fn read_terminal(
         let mut send = |input| open &= forward(input);
         match poll(&mut descriptors, wait) {
             Ok(0) => reader.idle(&mut send),
+            Ok(_) if !in_foreground() => std::thread::sleep(BACKGROUND_PERIOD),
             Ok(_) => match read(terminal, &mut bytes) {
                 Ok(0) => return Ok(()),
                 Ok(length) => reader.take(&bytes[..length], &mut send),

@@ -1,5 +1,6 @@
 //! `quadfrog attach` and `quadfrog sessions`: running sessions on this machine, seen by a second person.
 
+use std::io;
 use std::path::PathBuf;
 
 use crate::app;
@@ -18,6 +19,9 @@ use super::completion;
 use super::console::{ScreenArguments, options};
 use super::failure::Failure;
 use super::replay::recorded_robot;
+
+/// Answer where there is no session.
+const NONE_RUNS: &str = "no session runs on this machine under this user";
 
 #[derive(Debug, Args)]
 pub struct AttachArguments {
@@ -51,9 +55,11 @@ pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
 
 /// Lists the sessions that run.
 pub fn list() -> Result<(), Failure> {
-    let sessions = sessions()?;
-    if sessions.is_empty() {
-        notice!("no session runs on this machine under this user");
+    let FoundSessions { running, silent } = sessions()?;
+    if running.is_empty() {
+        if !silent.iter().any(hangs) {
+            notice!("{NONE_RUNS}");
+        }
         return Ok(());
     }
     let heading = ["process", "robot", "task", "operator", "since (UTC)", "folder"].map(str::to_owned).to_vec();
@@ -63,18 +69,30 @@ pub fn list() -> Result<(), Failure> {
             (process.to_string(), format!("{backend} {robot}"), folder.display().to_string());
         vec![process, robot, task.clone(), operator.clone(), since.clone(), folder]
     };
-    let rows: Vec<_> = std::iter::once(heading).chain(sessions.iter().map(row)).collect();
+    let rows: Vec<_> = std::iter::once(heading).chain(running.iter().map(row)).collect();
     output::text(&table::aligned(&rows, |_| true));
     Ok(())
 }
 
-fn sessions() -> Result<Vec<RunningSession>, Failure> {
-    let FoundSessions { running, silent } =
-        find_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
-    for (socket, error) in silent {
-        notice!("{}: {error}", socket.display());
+/// Finds the sessions and names those that do not answer.
+fn sessions() -> Result<FoundSessions, Failure> {
+    let found = find_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
+    for silent in &found.silent {
+        let (socket, error) = silent;
+        let name = socket.file_stem().unwrap_or_default().display();
+        match hangs(silent) {
+            true => notice!(
+                "process {name}: {error}; it is stopped (`kill -CONT {name}` continues it) or hangs, and passes no STOP on"
+            ),
+            false => notice!("{}: {error}", socket.display()),
+        }
     }
-    Ok(running)
+    Ok(found)
+}
+
+/// Whether a session is there, named by its process as its socket is, that does not answer.
+fn hangs((_, error): &(PathBuf, io::Error)) -> bool {
+    error.kind() == io::ErrorKind::TimedOut
 }
 
 fn described(facts: &SessionFacts) -> String {
@@ -83,15 +101,16 @@ fn described(facts: &SessionFacts) -> String {
 }
 
 /// Returns the session that is meant.
-fn choose(named: Option<&str>, sessions: Vec<RunningSession>) -> Result<RunningSession, Failure> {
-    let known: Vec<String> = sessions.iter().map(|session| described(&session.facts)).collect();
+fn choose(named: Option<&str>, sessions: FoundSessions) -> Result<RunningSession, Failure> {
+    let FoundSessions { running, silent } = sessions;
+    let known: Vec<String> = running.iter().map(|session| described(&session.facts)).collect();
     let meant = |session: &RunningSession| {
         let Some(named) = named else { return true };
         let folder = std::fs::canonicalize(named).ok();
         named.parse() == Ok(session.facts.process)
             || folder.is_some() && std::fs::canonicalize(&session.facts.folder).ok() == folder
     };
-    let mut found: Vec<RunningSession> = sessions.into_iter().filter(meant).collect();
+    let mut found: Vec<RunningSession> = running.into_iter().filter(meant).collect();
     let of_named = named.map(|named| format!("{named}: ")).unwrap_or_default();
     match (found.pop(), found.is_empty()) {
         (Some(session), true) => Ok(session),
@@ -99,12 +118,13 @@ fn choose(named: Option<&str>, sessions: Vec<RunningSession>) -> Result<RunningS
             "{of_named}several sessions run; give the number or the folder of one:\n{}",
             known.join("\n")
         ))),
-        (None, _) if known.is_empty() => {
-            Err(Failure::input(format!("{of_named}no session runs on this machine under this user")))
+        (None, _) => {
+            let text = match known.is_empty() {
+                false => format!("no session of that number or folder runs; these run:\n{}", known.join("\n")),
+                true if silent.iter().any(hangs) => "no session answers".to_owned(),
+                true => NONE_RUNS.to_owned(),
+            };
+            Err(Failure::input(format!("{of_named}{text}")))
         }
-        (None, _) => Err(Failure::input(format!(
-            "{of_named}no session of that number or folder runs; these run:\n{}",
-            known.join("\n")
-        ))),
     }
 }

@@ -1,7 +1,7 @@
 //! `quadfrog doctor`: checks of this machine for the control thread and the console, one line each, with remedies.
 
 use std::fmt;
-use std::io::Write;
+use std::io::{self, IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -227,10 +227,12 @@ fn colours() -> DoctorItem {
 }
 
 fn size() -> DoctorItem {
-    let Ok((columns, rows)) = crossterm::terminal::size() else {
+    let size = crossterm::terminal::size().ok().filter(|_| io::stdin().is_terminal());
+    let Some((columns, rows)) = size else {
         return DoctorItem::new("terminal size", "not a terminal", false, "run the console itself in a terminal");
     };
-    let remedy = "below 80x24 only the mode, STOP and the link are shown; make the window larger";
+    let remedy =
+        "below 80x24 the screen is reduced, below 60x20 to the mode, STOP and the link; make the window larger";
     DoctorItem::new("terminal size", format!("{columns}x{rows}"), columns >= 80 && rows >= 24, remedy)
 }
 

@@ -179,6 +179,18 @@ fn named_in(file: &Path) -> String {
     format!("{}: ", file.display())
 }
 
+/// Returns how much of a file is lost. Of an end that was cut off nothing tells how long it was.
+fn lost_in_words(player: &Player) -> String {
+    let within = player.lost_ns() as f64 / 1e9;
+    let after =
+        format!("what followed {:.3} s, and nothing tells how much that was", player.duration_ns() as f64 / 1e9);
+    match (player.lacks_data_at_its_end(), player.lost_ns()) {
+        (false, _) => format!("{within:.3} s lost"),
+        (true, 0) => format!("lost: {after}"),
+        (true, _) => format!("lost: {within:.3} s, and {after}"),
+    }
+}
+
 /// Returns whether a file is whole, or as whole as the session that still writes it has made it.
 fn check_file(file: &Path) -> Result<bool, Failure> {
     let written = is_written(file);
@@ -220,7 +232,7 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
         match (whole, lost_before.is_empty()) {
             (true, true) => "whole".to_owned(),
             (true, false) => "everything that was recovered is there".to_owned(),
-            (false, _) => format!("{:.3} s lost", player.lost_ns() as f64 / 1e9),
+            (false, _) => lost_in_words(&player),
         }
     );
     Ok(whole)

@@ -15,6 +15,7 @@ use crate::{notice, output};
 use clap::Args;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
+use quadfrog::trial::TrialRecord;
 
 use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
@@ -157,6 +158,10 @@ fn end_of(trial: u32, recording: &Timeline) -> Result<u64, String> {
     let runs = recording.trials();
     runs.iter().rev().find(|run| run.trial == trial).map(|run| run.end_ns).ok_or_else(|| {
         let known = runs.iter().map(|run| run.trial.to_string()).collect::<Vec<_>>().join(", ");
-        format!("no trial {trial}; its trials: {}", if known.is_empty() { "none" } else { &known })
+        let known = if known.is_empty() { "none" } else { &known };
+        match recording.rows().get(&trial).is_some_and(TrialRecord::was_not_run) {
+            true => format!("trial {trial} was not run; trials that ran: {known}"),
+            false => format!("no trial {trial}; its trials: {known}"),
+        }
     })
 }

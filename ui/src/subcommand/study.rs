@@ -259,7 +259,10 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     let not_run = rows.iter().filter(|row| row.was_not_run()).count();
     if not_run > 0 {
         let proposals = counted(not_run, "proposal");
-        let _ = writeln!(text, "{} that ran, {proposals} that did not", counted(rows.len() - not_run, "trial"));
+        let without_jump = rows.iter().filter(|row| !row.was_not_run() && row.did_not_jump()).count();
+        let without_jump = if without_jump > 0 { format!(" ({without_jump} without a jump)") } else { String::new() };
+        let ran = counted(rows.len() - not_run, "trial");
+        let _ = writeln!(text, "{ran} that ran{without_jump}, {proposals} that did not");
     }
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
@@ -346,6 +349,13 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     }
     .map_err(|error| refuse(&error))?;
     let mut study = selector.open()?.study;
+    // A point that was removed from the queue has never run: its row has no parameters.
+    let (trials, without_parameters): (Vec<TableTrial>, Vec<TableTrial>) =
+        trials.into_iter().partition(|trial| !trial.parameters.is_empty());
+    let left_out = match without_parameters.len() {
+        0 => String::new(),
+        rows => format!("; {} without parameters left out", counted(rows, "row")),
+    };
     let (finished, unfinished): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if !queue {
@@ -358,7 +368,7 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
         if !unfinished.is_empty() {
             let _ = write!(text, "; {} ignored, --queue queues them", counted(unfinished.len(), "unfinished trial"));
         }
-        output::text(&(text + "\n"));
+        output::text(&(text + &left_out + "\n"));
         return Ok(());
     }
     let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
@@ -369,7 +379,7 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    output::text(&format!("{} queued\n", counted(points.len(), "point")));
+    output::text(&format!("{} queued{left_out}\n", counted(points.len(), "point")));
     Ok(())
 }
 
@@ -394,9 +404,12 @@ fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Fail
     if let Some((name, _)) = point.iter().find(|(name, _)| point.iter().filter(|(n, _)| n == name).count() > 1) {
         return Err(Failure::input(format!("{name} is given twice")));
     }
-    let mut study = selector.open()?.study;
+    let Opened { mut study, ours, .. } = selector.open()?;
     study.check_point(point)?;
     let number = study.enqueue(point, &[])?;
-    output::text(&format!("Queued as trial {number}\n"));
+    let counted = study.trials().iter().filter(|trial| trial.state.is_observed()).count();
+    let full = ours.and_then(|ours| ours.budget).is_some_and(|budget| counted >= budget as usize);
+    let then = if full { "; the study has all of its trials: it runs once `C` in the console gives more" } else { "" };
+    output::text(&format!("Queued as trial {number}{then}\n"));
     Ok(())
 }

@@ -18,12 +18,14 @@ use std::time::Duration;
 use crossterm::cursor::Hide;
 use crossterm::event::{DisableBracketedPaste, DisableMouseCapture, EnableBracketedPaste, EnableMouseCapture};
 use crossterm::queue;
-use crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, enable_raw_mode, size};
+use crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, disable_raw_mode, enable_raw_mode, size};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::termios::Termios;
 use quadfrog::realtime::channel::StopLatch;
 use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
+use crate::foreground;
 use crate::graphics::EncodedPicture;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS};
 use crate::output;
@@ -109,6 +111,8 @@ pub(crate) struct TerminalScreen {
     picture: Option<Rc<EncodedPicture>>,
     mouse: bool,
     protocol: TerminalProtocol,
+    /// The mode of the configured terminal; none where it cannot be read.
+    mode: Option<Termios>,
     hung_up: bool,
 }
 
@@ -137,6 +141,7 @@ impl TerminalScreen {
             picture: None,
             mouse: false,
             protocol,
+            mode: None,
             hung_up: false,
         };
         screen.configure()?;
@@ -145,7 +150,10 @@ impl TerminalScreen {
 
     /// Configures the terminal, also after a suspension.
     pub fn configure(&mut self) -> io::Result<()> {
+        // The library enables the raw mode only where it is not enabled, and does not see that a shell has changed it.
+        disable_raw_mode()?;
         enable_raw_mode()?;
+        self.mode = foreground::mode();
         ENTERED.store(true, Ordering::Release);
         if let Some(terminal) = &mut self.terminal {
             let writer = &mut terminal.backend_mut().0;
@@ -166,6 +174,11 @@ impl TerminalScreen {
             terminal.clear()?;
         }
         Ok(())
+    }
+
+    /// Whether another program has changed the terminal's mode: keys then arrive late or not at all.
+    pub fn mode_was_changed(&self) -> bool {
+        self.mode != foreground::mode()
     }
 
     /// Restores the terminal for a suspension.

@@ -14,6 +14,8 @@ use crossterm::queue;
 use crossterm::style::ResetColor;
 use crossterm::terminal::{EndSynchronizedUpdate, LeaveAlternateScreen, disable_raw_mode};
 
+use crate::foreground::in_foreground;
+
 /// Time limit of the restoration of a terminal that does not read.
 pub const LEAVE_TIMEOUT: Duration = Duration::from_millis(500);
 
@@ -29,9 +31,10 @@ pub fn own_file() -> io::Result<File> {
     Ok(File::from(io::stdout().as_fd().try_clone_to_owned()?))
 }
 
-/// Restores screen, cursor and cooked mode, if the terminal was configured. Times out on a terminal that does not read.
+/// Restores screen, cursor and cooked mode, if the terminal was configured. Times out on a terminal that does not read. In the
+/// background it does nothing: the terminal is the shell's, and the system would stop this process.
 pub fn restore() {
-    if !ENTERED.swap(false, Ordering::AcqRel) {
+    if !ENTERED.swap(false, Ordering::AcqRel) || !in_foreground() {
         return;
     }
     let (done, finished): (Sender<()>, Receiver<()>) = channel();

@@ -75,8 +75,11 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         lines.push(Line::from(span(theme, Role::Quiet, text)));
     }
     let unit = if a.unit == b.unit { format!("J {}", a.unit) } else { format!("J {},{}", a.unit, b.unit) };
-    let of_row =
-        |_: &ComparedTrial, row: &TrialRecord| value(row.value.or_else(|| model.session.measured_objective(row)));
+    let of_row = |_: &ComparedTrial, row: &TrialRecord| {
+        let (shown, role) = value(row.value.or_else(|| model.session.measured_objective(row)));
+        // As in the table.
+        (if row.counts_by_hand() { format!("{shown} h") } else { shown }, role)
+    };
     lines.push(line(&unit, both(&of_row)));
     lines.push(line("verdict", both(&|_, row| verdict(row))));
     for name in parameters(comparison) {

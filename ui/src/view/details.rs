@@ -105,7 +105,7 @@ pub fn details(
                 "touchdown",
                 format!("at {time_s:.3} s, {dx_m:+.4} m forward, {dy_m:+.4} m left, turned {dyaw_rad:+.4} rad"),
             ),
-            None if m.flights > 0 => row("touchdown", "none: the trial ended in the air".to_owned()),
+            None if m.ended_in_the_air() => row("touchdown", "none: the trial ended in the air".to_owned()),
             // Of a trial that was stopped within the impulse an earlier version has counted no flight.
             None if m.air_s > 0.0 && trial.suggested != Some(Verdict::Void) => {
                 row("touchdown", "none after the impulse: the feet were down before its end".to_owned());

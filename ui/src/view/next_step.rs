@@ -267,9 +267,18 @@ fn behind(model: &Model) -> Option<String> {
 fn replay(model: &Model) -> NextStep {
     let old = behind(model);
     if let Some(observer) = model.observer() {
+        let unconfirmed = observer.demanded > observer.stopped;
         let lead = match (observer.ended, old) {
             (true, _) => "The session has ended. STOP does not reach its robot any longer.".to_owned(),
-            (false, Some(old)) => format!("{old} STOP reaches its robot at once."),
+            (false, _) if unconfirmed && model.session.info.is_hardware() => {
+                "STOP is not confirmed: the session does not answer. Damp the robot by its remote control.".to_owned()
+            }
+            (false, _) if unconfirmed => "STOP is not confirmed: the session does not answer.".to_owned(),
+            // Later ticks are there: the session runs, and this console shows earlier ones.
+            (false, Some(old)) if model.replay.as_ref().is_some_and(ReplayStatus::later_is_known) => {
+                format!("{old} STOP reaches its robot at once.")
+            }
+            (false, Some(old)) => format!("{old} The session may hang: STOP reaches its robot once it is confirmed."),
             (false, None) => "Watching, about 1 s behind. STOP reaches the robot of this session at once.".to_owned(),
         };
         return step(

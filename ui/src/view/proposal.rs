@@ -182,6 +182,9 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
             let hand = match (trial.hand_value, trial.suggested) {
                 (Some(_), Some(Verdict::Accept)) => " by hand",
                 (Some(_), _) => " by hand, if accepted",
+                (None, Some(Verdict::Void)) if trial.measured.as_ref().is_some_and(|m| m.ended_in_the_air()) => {
+                    " in the air, if accepted"
+                }
                 (None, Some(Verdict::Void)) => " if accepted",
                 (None, _) => "",
             };

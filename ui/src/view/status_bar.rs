@@ -343,7 +343,11 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
         Line::from(link),
         Line::from(format!("terminal {}x{}", area.width, area.height)),
         Line::from(format!("needed {COMPACT_COLUMNS}x{COMPACT_ROWS}")),
-        Line::from(span(theme, Role::Quiet, "STOP works, no key arms or jumps")),
+        Line::from(span(
+            theme,
+            Role::Quiet,
+            if model.can_stop() { "STOP works, no key arms or jumps" } else { "enlarge the terminal" },
+        )),
     ];
     // What a key was answered, or refused for.
     lines.extend(message_rows(model, area.width).into_iter().map(|row| row.style(theme.style(Role::Warning))));
