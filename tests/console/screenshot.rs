@@ -113,6 +113,19 @@ fn a_recording_has_the_time_of_the_first_arming_checks() {
     assert_eq!(armed(&cells(&svg, 24).0.join("\n")), live);
 }
 
+/// Regression: beside "pitch 1.0004 rad exceeds 1.0000 rad" the heading of the chart had the sample 3 ms before, 0.994 rad.
+#[test]
+fn the_heading_of_a_chart_has_the_value_at_the_playhead() {
+    let program = Program::new();
+    let fall = sample().with_file_name("fall");
+    let lines = |time: &[&str]| {
+        let base = ["screenshot", fall.to_str().unwrap(), "--size", "120x40"];
+        cells(&program.text(&[&base, time].concat()), 40).0.join("\n")
+    };
+    assert_shows(&lines(&[]), &["pitch +1.000 rad"]);
+    assert_shows(&lines(&["--time", "1.276"]), &["pitch +0.998 rad"]);
+}
+
 /// The time of day behind "at".
 fn time_of(line: &str) -> String {
     line.split(" at ").nth(1).unwrap_or_default().chars().take("12:34:56".len()).collect()

@@ -70,8 +70,7 @@ pub struct Chart<'a> {
     /// Least and largest value of its vertical axis.
     pub range: (f32, f32),
     pub axis: TimeAxis,
-    pub history: &'a SignalHistory,
-    /// Its values in the window.
+    /// The values in the window.
     pub curve: &'a Curve,
     /// The column of each of these samples, from [`sample_columns`].
     pub columns: &'a [SampleColumn],
@@ -79,7 +78,9 @@ pub struct Chart<'a> {
     pub phases: &'a [Option<Phase>],
     /// A trial to lay under the samples.
     pub ghost: Option<Ghost<'a>>,
-    /// Time of the value in the heading; the newest without it.
+    /// Sample of the value in the heading.
+    pub named: Option<&'a ChartSample>,
+    /// Time of the cursor; none without one.
     pub cursor_ns: Option<u64>,
     /// Whether the sweep's cursor is drawn as a line.
     pub cursor_line: bool,
@@ -211,10 +212,7 @@ impl Chart<'_> {
     /// Name, contact indicator and value. Returns the columns that they take.
     fn draw_heading(&self, buffer: &mut Buffer, area: Rect) -> usize {
         let theme = &self.theme;
-        let sample = match self.cursor_ns {
-            Some(time_ns) => self.history.at(time_ns),
-            None => self.history.samples().next_back(),
-        };
+        let sample = self.named;
         let contact = match (self.style.foot, sample.and_then(|sample| self.style.contact(sample))) {
             (Some(_), Some(contact)) => theme.contact_indicator(contact),
             (Some(_), None) => " ",

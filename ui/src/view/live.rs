@@ -14,7 +14,7 @@ use super::series_style::{SeriesStyle, style};
 use super::{beside, objective, points, proposal, trials, wireframe};
 use crate::model::Model;
 use crate::model::comparison::{Comparison, impulse_start_ns};
-use crate::model::history::SignalHistory;
+use crate::model::history::{ChartSample, SignalHistory};
 use crate::model::landed::LandedTrial;
 use crate::model::live::Panel;
 use crate::settings::ChartMode;
@@ -152,9 +152,19 @@ struct ChartSource<'a> {
     axis: TimeAxis,
     ghost: Option<Ghost<'a>>,
     cursor_ns: Option<u64>,
+    /// The newest tick, where the present is charted: the charts hold every fifth.
+    present: Option<ChartSample>,
 }
 
 impl<'a> ChartSource<'a> {
+    /// The sample whose values stand in the headings: that at the cursor, else the newest.
+    fn named(&self) -> Option<&ChartSample> {
+        match self.cursor_ns {
+            Some(time_ns) => self.history.at(time_ns),
+            None => self.present.as_ref().or_else(|| self.history.samples().next_back()),
+        }
+    }
+
     /// Two trials, the landed trial, the present, or the frozen history.
     fn of(model: &'a Model) -> ChartSource<'a> {
         if let Some(comparison) = &model.live.comparison {
@@ -174,7 +184,10 @@ impl<'a> ChartSource<'a> {
         let ghost =
             trace.zip(under).map(|(trace, start_ns)| Ghost { trace, start_ns, role: Role::Ghost, named: false });
         let cursor_ns = model.live.frozen.is_some().then_some(model.live.cursor_ns);
-        ChartSource { history: Cow::Borrowed(history), axis, ghost, cursor_ns }
+        let tick = &model.snapshot.tick;
+        let newest = history.samples().next_back().filter(|newest| newest.time_ns <= tick.time_ns);
+        let present = newest.map(|newest| ChartSample { heard: newest.heard, ..ChartSample::from(tick) });
+        ChartSource { history: Cow::Borrowed(history), axis, ghost, cursor_ns, present }
     }
 
     /// The landed trial over the whole width, with another one under it.
@@ -183,7 +196,7 @@ impl<'a> ChartSource<'a> {
         let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
         let under = |(_, trace)| Ghost { trace, start_ns: landed.start_ns, role: Role::Ghost, named: false };
         let history = Cow::Owned(SignalHistory::of_trace(landed.samples));
-        ChartSource { history, axis, ghost: landed.under.map(under), cursor_ns }
+        ChartSource { history, axis, ghost: landed.under.map(under), cursor_ns, present: None }
     }
 
     /// Two trials, from the first sample to the last.
@@ -192,7 +205,7 @@ impl<'a> ChartSource<'a> {
         let axis = TimeAxis { mode: ChartMode::Scroll, window_ns: last - first + 1, newest_ns: last };
         let ghost = Ghost { trace: &comparison.trace_b, start_ns: comparison.start_ns, role: Role::Good, named: true };
         let history = Cow::Borrowed(&comparison.history_a);
-        ChartSource { history, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns) }
+        ChartSource { history, axis, ghost: Some(ghost), cursor_ns: Some(comparison.cursor_ns), present: None }
     }
 }
 
@@ -227,11 +240,11 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
             style: *style,
             range: style.ranges.get(range).copied().unwrap_or((-1.0, 1.0)),
             axis: source.axis,
-            history: &source.history,
             curve: &curves[index],
             columns: &of_columns[index % across].2,
             phases: &of_columns[index % across].1,
             ghost: source.ghost,
+            named: source.named(),
             cursor_ns: source.cursor_ns,
             cursor_line: model.live.cursor_line,
             middle_tick,
