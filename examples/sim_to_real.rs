@@ -2,7 +2,7 @@
 //! members of the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `jobs`, `least_p_stand`. Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
+//! `trials`, `seed`, `jobs`, `least_p_stand` (left out: that of the task's configuration). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
 //! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`optimum`]): the largest of many noisy values would be
@@ -241,7 +241,7 @@ fn targets(plan: &PriorPlan, count: usize, seed: u32) -> Vec<Target> {
     (0..count).map(target).collect()
 }
 
-fn known(name: &str, jobs: usize, sampler: SamplerConfig) -> KnownTask {
+fn known(name: &str, jobs: usize, least_p_stand: Option<f64>) -> KnownTask {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let continuous = name == "continuous";
     let mut config = Config::load(continuous.then(|| root.join("examples/continuous")).as_deref()).expect("loads");
@@ -258,6 +258,8 @@ fn known(name: &str, jobs: usize, sampler: SamplerConfig) -> KnownTask {
     let mirrored = Prior::new(prior.parameters.clone(), mirrored, prior.worlds.clone(), prior.slip.clone());
     let space =
         Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)))).expect("a space");
+    let mut sampler = config.optimize.sampler;
+    sampler.least_p_stand = least_p_stand.unwrap_or(sampler.least_p_stand);
     let mut task = KnownTask {
         name: name.to_owned(),
         sampler,
@@ -301,7 +303,7 @@ fn main() {
         ("trials", "20"),
         ("seed", "9000"),
         ("jobs", ""),
-        ("least_p_stand", "0.75"),
+        ("least_p_stand", ""),
     ]
     .map(|(key, value)| (key.to_owned(), value.to_owned()))
     .into();
@@ -314,8 +316,8 @@ fn main() {
     let jobs = if settings["jobs"].is_empty() { cores() } else { number("jobs") };
     let (robots, studies, trials, seed) =
         (number("robots").max(4), number("studies"), number("trials"), number("seed"));
-    let least_p_stand = settings["least_p_stand"].parse().expect("`least_p_stand` is a number");
-    let sampler = SamplerConfig { least_p_stand, ..SamplerConfig::default() };
+    let least_p_stand = Some(&settings["least_p_stand"]).filter(|text| !text.is_empty());
+    let least_p_stand = least_p_stand.map(|text| text.parse().expect("`least_p_stand` is a number"));
     let wanted = &settings["samplers"];
     let proposers: Vec<Proposer> = Proposer::ALL
         .iter()
@@ -335,7 +337,7 @@ fn main() {
     println!("|---|---|{}---|---|", "---|".repeat(AFTER.len()));
     let mut notes = String::new();
     for name in settings["tasks"].split(',') {
-        let task = known(name, jobs, sampler.clone());
+        let task = known(name, jobs, least_p_stand);
         let targets = targets(&task.plan, robots, seed as u32);
         let mut work = Vec::new();
         for target in 0..robots {

@@ -79,6 +79,7 @@ impl ControlLoop {
             suspended_ms: clock.suspended_ns().map_or(0, |bounds| self.suspend.observe(bounds)),
             guard_silent_ms: self.guard_silent_ms,
         };
+        let mode = cycle.mode();
         let tick = *cycle.tick(&inputs, clock, robot);
 
         counters.late_ticks += u64::from(start.lateness_ns as f64 > CONTROL_PERIOD_S * 1e9 / 2.0);
@@ -87,7 +88,7 @@ impl ControlLoop {
         counters.state_age_ms = cycle.state_age_ms();
         counters.link = robot.link();
         counters.ticks_not_recorded += u64::from(end.ticks.push(tick).is_err());
-        if tick.number.is_multiple_of(SHOWN_EVERY) {
+        if tick.number.is_multiple_of(SHOWN_EVERY) || tick.mode != mode {
             counters.ticks_not_shown += u64::from(end.shown.push(tick).is_err());
         }
         let has_events = cycle.events().iter().next().is_some();

@@ -12,7 +12,8 @@ pub const COMMANDS: usize = 64;
 pub const TICKS: usize = 4096;
 /// Capacity of the console's ring, decimated ticks.
 pub const SHOWN_TICKS: usize = 1024;
-/// Decimation of the ticks for the console's charts.
+/// Decimation of the ticks for the console's charts, which also have each tick in which the mode changes: the values at which a limit
+/// trips are among them.
 pub const SHOWN_EVERY: u64 = 5;
 /// Capacity of the ring of events.
 pub const EVENTS: usize = 256;

@@ -335,8 +335,8 @@ impl Timeline {
         part.player.seek(part.in_file(time_ns));
     }
 
-    /// Continues at `from_ns` like [`seek`](Timeline::seek); of the ticks before `to_ns` only those whose number is a multiple
-    /// of `every` are played.
+    /// Continues at `from_ns` like [`seek`](Timeline::seek); of the ticks before `to_ns` only those are played whose number is a
+    /// multiple of `every`, and those in which the mode changes.
     pub fn seek_sparse(&mut self, from_ns: u64, to_ns: u64, every: u32) {
         self.seek(from_ns);
         self.sparse_until = Some((to_ns, every));

@@ -233,6 +233,15 @@ fn a_table_that_is_imported_twice_is_no_repeat() {
     assert!(printed.starts_with("0 trials") && printed.contains("2 were there already"), "{printed}");
 }
 
+/// Regression: the help of import offered Parquet, which it refuses.
+#[test]
+fn import_offers_the_formats_that_it_reads() {
+    let program = Program::new();
+    let help = program.text(&["study", "import", "--help"]);
+    assert!(help.contains("csv") && !help.contains("parquet"), "{help}");
+    assert!(program.text(&["study", "export", "--help"]).contains("parquet"));
+}
+
 /// Regression: a point that was removed from the queue came again as a trial without values, and was queued as one.
 #[test]
 fn a_removed_point_is_not_imported() {

@@ -2,7 +2,7 @@
 
 use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::engine::ObserverStatus;
-use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, Transition};
+use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, StageRecord, Transition};
 use quadfrog::report::table;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
@@ -301,6 +301,21 @@ fn a_followed_recording_says_how_old_what_it_shows_is() {
     // The first key beside the sentence is the way out.
     let last = followed(0, 0, true).screen(100, 30).lines().last().unwrap().to_owned();
     assert_shows(&last, &["q quit"]);
+}
+
+/// Regression: the details of a trial whose verdict could be undone said that its value was reported.
+#[test]
+fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    console.press(&["2", "Enter"]);
+    assert_shows(&console.screen(120, 40), &["reported to the optimizer once it cannot be undone"]);
+    console.stage(ExperimentStage::Running, 1);
+    let later = console.screen(120, 40);
+    assert!(later.contains("reported to the optimizer") && !later.contains("once it cannot"), "{later}");
 }
 
 /// Regression: battery, temperature and clock of a silent robot stayed on the screen as if they were of now.

@@ -12,9 +12,10 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use proptest::prelude::*;
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Played, Player};
-use quadfrog::recording::record::{Record, Stamped};
+use quadfrog::recording::record::{Record, Stamped, Transition};
 use quadfrog::recording::recover::recover;
 use quadfrog::recording::writer::Writer;
+use quadfrog::telemetry::Mode;
 use support::*;
 
 /// A study of 4 s: the bytes of its file before and after finishing, and its content.
@@ -479,14 +480,23 @@ fn a_pipe_and_a_device_are_refused_at_once() {
 }
 
 #[test]
-fn a_sparse_seek_gives_every_fifth_tick_before_its_end_and_every_one_after_it() {
-    let Whole { finished, everything, .. } = whole();
+fn a_sparse_seek_gives_every_fifth_tick_and_changes_of_the_mode_before_its_end_and_every_tick_after_it() {
     let folder = tempfile::tempdir().unwrap();
-    let mut player = Player::open(file(folder.path(), "session.mcap", finished)).unwrap();
+    let path = folder.path().join("session.mcap");
+    let (ticks, mut records) = study(4);
+    let changed_ns = 1_503 * MS;
+    let fall = Transition { from: Mode::Settle, to: Mode::Damped, cause: "pitch".to_owned() };
+    records.push(Stamped { time_ns: changed_ns, record: Record::Transition(fall) });
+    let everything = in_order(&ticks, &records);
+    write(&path, &everything);
+    let mut player = Player::open(&path).unwrap();
     player.seek_sparse(1_000 * MS, 3_000 * MS, 5);
     let played: Vec<_> = player.collect();
     let expected = everything.iter().filter(|played| match played {
-        Played::Tick(tick) => tick.time_ns >= 1_000 * MS && (tick.number % 5 == 0 || tick.time_ns >= 3_000 * MS),
+        Played::Tick(tick) => {
+            let shown = tick.number % 5 == 0 || tick.time_ns == changed_ns;
+            tick.time_ns >= 1_000 * MS && (shown || tick.time_ns >= 3_000 * MS)
+        }
         Played::Record(stamped) => stamped.time_ns >= 1_000 * MS,
     });
     assert_equal(&played, &expected.cloned().collect::<Vec<_>>());

@@ -8,14 +8,14 @@ use std::time::Duration;
 use crate::bench::shipped;
 use quadfrog::engine::control_thread::{ControlThreadParts, drive, lead};
 use quadfrog::engine::{EngineThreads, Options};
-use quadfrog::realtime::channel::channels;
+use quadfrog::realtime::channel::{SHOWN_EVERY, channels};
 use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
 use quadfrog::realtime::scheduling::Scheduling;
 use quadfrog::realtime::thread::{PeriodicTask, TickStart, WARM_UP_LEAD};
 use quadfrog::recording::recorder::Recorder;
 use quadfrog::robot::{JointCommand, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::Simulator;
-use quadfrog::telemetry::Command;
+use quadfrog::telemetry::{Command, Mode};
 use quadfrog::trial::{Backend, Task};
 
 /// Answers until `reads` or `warm_ups` is used up, then panics; keeps what it is sent.
@@ -90,6 +90,38 @@ fn a_panic_in_a_tick_or_its_warm_up_is_followed_by_damping_for_half_a_second_and
         assert!(sent.len() >= 500, "{}", sent.len());
         assert_eq!(damped(true, until, 800).1, 800, "it continues until the engine closes");
     }
+}
+
+/// Regression: the tick in which a limit trips was not among those of the charts, whose last value lay below the limit.
+#[test]
+fn the_ticks_for_charts_are_every_fifth_and_those_in_which_the_mode_changes() {
+    let (_, _, settings) = shipped(Backend::Simulator);
+    let (control, session, mut console, _ticks) = channels();
+    let mut robot = Brittle { reads: u32::MAX, warm_ups: u32::MAX, sent: Vec::new() };
+    let mut start = ControlThreadParts {
+        settings: &settings,
+        scheduling: Scheduling::default(),
+        report: channel().0,
+        clock: &SimulatedClock,
+        closing: &AtomicBool::new(false),
+        hardware: false,
+        guard_heartbeat: None,
+    };
+    let unpaced = |ticking: &mut dyn PeriodicTask| {
+        for ms in 0..30 {
+            if ms == 13 {
+                session.stop.set();
+            }
+            let _ = ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 });
+        }
+        Ok(())
+    };
+    drive(&mut start, control, &mut robot, unpaced, || {}).unwrap();
+    let shown: Vec<_> = std::iter::from_fn(|| console.shown.pop().ok()).map(|tick| (tick.number, tick.mode)).collect();
+    // The first tick leaves Offline, the fourteenth sees STOP.
+    let numbers = [1, 5, 10, 14, 15, 20, 25, 30];
+    assert_eq!(SHOWN_EVERY, 5);
+    assert_eq!(shown, numbers.map(|number| (number, if number < 14 { Mode::Observe } else { Mode::Damped })));
 }
 
 #[test]

@@ -179,7 +179,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Fall, "fall", &["f"], G::Verdict, "fall: it counts as J = 0 (Trials: as accept)"),
         row(A::Void, "void", &["v"], G::Verdict, "void: cause outside the parameters; hidden from the sampler (Trials: as accept)"),
         row(A::Rerun, "re-run", &["r"], G::Verdict, "re-run: void, and the same parameters again (Trials: queue the row)"),
-        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial runs or is skipped, or the best is confirmed"),
+        row(A::Undo, "undo", &["u"], G::Verdict, "take the last verdict back, until the next trial runs or is skipped, or repeats begin or are called off"),
         row(A::HandValue, "hand-value", &["="], G::Verdict, "use a value measured by hand"),
         row(A::Note, "note", &["m"], G::Verdict, "write a note on a trial"),
 

@@ -208,8 +208,8 @@ impl Player {
         self.next_chunk = chunks.iter().position(|chunk| chunk.end >= log_time).unwrap_or(chunks.len());
     }
 
-    /// Continues at `from_ns` like [`seek`](Player::seek); of the ticks before `to_ns` only those whose number is a multiple of
-    /// `every` are played.
+    /// Continues at `from_ns` like [`seek`](Player::seek); of the ticks before `to_ns` only those are played whose number is a
+    /// multiple of `every`, and those in which the mode changes.
     pub fn seek_sparse(&mut self, from_ns: u64, to_ns: u64, every: u32) {
         self.seek(from_ns);
         self.sparse_until = Some((to_ns, every.max(1)));
@@ -250,6 +250,13 @@ impl Player {
         self.first_trouble.get_or_insert_with(|| trouble.to_string());
     }
 
+    /// Whether the mode changes in the tick of this time.
+    fn changes_mode(&self, time_ns: u64) -> bool {
+        let from = self.events.partition_point(|event| event.time_ns < time_ns);
+        let mut of_tick = self.events[from..].iter().take_while(|event| event.time_ns == time_ns);
+        of_tick.any(|event| matches!(event.record, Record::Transition(_)))
+    }
+
     /// Reads the next chunk into the queue.
     fn read_chunk(&mut self) {
         let chunk = self.chunks[self.next_chunk].clone();
@@ -269,7 +276,7 @@ impl Player {
             }
             let left_out =
                 |(until_ns, every)| topic == Topic::Tick && time_ns < until_ns && header.sequence % every != 0;
-            if self.sparse_until.is_some_and(left_out) {
+            if self.sparse_until.is_some_and(left_out) && !self.changes_mode(time_ns) {
                 continue;
             }
             let played = match topic {

@@ -104,7 +104,7 @@ impl TrialPair {
         Ok(SideBySide { a, b, ticks_a, ticks_b })
     }
 
-    /// Returns every fifth tick of a trial of the played recording, wherever the playhead is.
+    /// Returns the ticks that the charts show of a trial of the played recording, wherever the playhead is.
     ///
     /// # Errors
     /// When none can be read.
@@ -143,7 +143,7 @@ fn compared(recording: &Timeline, trial: u32, named: bool) -> ComparedTrial {
     }
 }
 
-/// Every fifth tick of a run.
+/// Every fifth tick of a run, and those in which the mode changes.
 pub(super) fn ticks(recording: &mut Timeline, run: &TrialRun) -> Vec<Tick> {
     recording.seek_sparse(run.begin_ns, u64::MAX, SHOWN_EVERY as u32);
     let mut ticks = Vec::new();

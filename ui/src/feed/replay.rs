@@ -355,8 +355,9 @@ impl ReplayFeed {
     fn show(&mut self, played: Played, messages: &mut Vec<Msg>) {
         match played {
             Played::Tick(tick) => {
+                let changes_mode = tick.mode != self.snapshot.tick.mode;
                 self.snapshot.tick = *tick;
-                if tick.number % SHOWN_EVERY == 0 {
+                if tick.number % SHOWN_EVERY == 0 || changes_mode {
                     messages.push(Msg::Tick(tick));
                 }
             }
@@ -411,7 +412,7 @@ impl ReplayFeed {
         self.snapshot = Snapshot::default();
         self.logged.clear();
         self.next.clear();
-        // The charts show every fifth tick; the newest one is shown in numbers.
+        // The charts show every fifth tick, and changes of the mode; the newest one is shown in numbers.
         self.recording.seek_sparse(from_ns, time_ns.saturating_sub(2 * FRAME_NS), SHOWN_EVERY as u32);
         self.time_ns = from_ns;
         self.advance(time_ns - from_ns, &mut messages);

@@ -50,7 +50,11 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
     }
     match rejudging.damage() {
         damage if damage.is_empty() => Ok(()),
-        damage => Err(anyhow::anyhow!("{}; the trials in it are not complete", damage.join("\n")).into()),
+        damage => Err(anyhow::anyhow!(
+            "{}; a trial of which ticks are missing there is judged by what is left",
+            damage.join("\n")
+        )
+        .into()),
     }
 }
 

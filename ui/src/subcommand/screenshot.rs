@@ -43,7 +43,7 @@ pub struct ScreenshotArguments {
     /// Frames of a moving picture in a second
     #[arg(long, value_name = "N", default_value_t = 8, requires = "animate", value_parser = whole_number(1_u8..=30))]
     frames_per_second: u8,
-    /// Keys pressed before, as in a replay: 2 for Trials, Enter for its details; separated by spaces
+    /// Keys pressed before, as in a replay: 2 for Trials, t for the next set of charts; separated by spaces
     #[arg(long, value_name = "KEYS", default_value = "1", value_parser = parse_keys)]
     keys: Keys,
     /// Size of the terminal

@@ -24,7 +24,7 @@ use super::completion;
 use super::failure::Failure;
 use super::output_file::write_file;
 use super::selection::parse_storage;
-use super::table::{format_of_name, table_format, written_format};
+use super::table::{format_of_name, read_table_format, table_format, written_format};
 
 #[derive(Debug, Args)]
 pub struct StudyCommand {
@@ -66,7 +66,7 @@ enum StudySubcommand {
         #[arg(value_name = "FILE")]
         table: PathBuf,
         /// Format of the table [default: by the file's name, else csv]
-        #[arg(long, value_name = "FORM", value_parser = table_format())]
+        #[arg(long, value_name = "FORM", value_parser = read_table_format())]
         format: Option<TableFormat>,
         /// Queue the points to be run instead; their results are ignored
         #[arg(long)]

@@ -8,13 +8,17 @@ use quadfrog::report::columns::TableFormat;
 use super::arguments::one_of;
 use super::failure::Failure;
 
-/// Value of an argument that selects a format.
+const CSV: (TableFormat, &str, &str) = (TableFormat::Csv, "csv", "Comma-separated values");
+const JSON: (TableFormat, &str, &str) = (TableFormat::Json, "json", "An array of objects");
+
+/// Value of an argument that selects the format of a written table.
 pub fn table_format() -> impl TypedValueParser<Value = TableFormat> {
-    one_of([
-        (TableFormat::Csv, "csv", "Comma-separated values"),
-        (TableFormat::Json, "json", "An array of objects"),
-        (TableFormat::Parquet, "parquet", "Apache Parquet, for pandas and polars"),
-    ])
+    one_of([CSV, JSON, (TableFormat::Parquet, "parquet", "Apache Parquet, for pandas and polars")])
+}
+
+/// Value of an argument that names the format of a table to be read.
+pub fn read_table_format() -> impl TypedValueParser<Value = TableFormat> {
+    one_of([CSV, JSON])
 }
 
 /// Returns the format that the extension of a name says.

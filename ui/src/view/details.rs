@@ -51,6 +51,9 @@ pub fn details(
         row("note", trial.note.clone());
     }
     let use_of = |value: f64| match trial.verdict {
+        Some(_) if session.undoable() == Some(trial.trial) => {
+            format!("{value:.4} {unit}, reported to the optimizer once it cannot be undone")
+        }
         Some(_) => format!("{value:.4} {unit}, reported to the optimizer"),
         None => format!("{value:.4} {unit} if it is judged as suggested"),
     };
