@@ -613,13 +613,16 @@ fn a_fall_is_no_stop_and_a_waiting_trial_is_named_while_another_row_is_selected(
 #[test]
 fn a_robot_that_fell_is_not_called_stopped_after_the_verdict() {
     let mut console = Console::review(Mode::Jump, Verdict::Fall);
-    let cause = TransitionCause::Fell(FallCause::BodyContact).to_string();
+    let pitch = FallCause::Pitch { measured_rad: 1.001, allowed_rad: 1.0 };
+    let cause = TransitionCause::Fell(pitch).to_string();
     console.record(Record::Transition(Transition { from: Mode::Jump, to: Mode::Damped, cause }));
     console.mode_of_ticks(Mode::Damped);
     assert_shows(&console.next_step(), &["FELL; check the robot"]);
     console.record(Record::Trial(trial(0, Some(Verdict::Fall), Some(Verdict::Fall))));
     console.stage(ExperimentStage::Proposed, 1);
-    assert_shows(&console.next_step(), &["FELL; check the robot, then k acknowledges: fell: "]);
+    assert_shows(&console.next_step(), &["FELL; check the robot, then k acknowledges: pitch "]);
+    // Regression: at 80 columns the limit was cut behind "fell: pitch 1.001 rad exceeds".
+    assert_shows(&console.screen(80, 24), &["k acknowledges: pitch 1.001 rad exceeds 1.000 rad"]);
     console.press(&["m"]);
     assert_shows(&console.next_step(), &["FELL: Enter keeps the note, Esc drops it; then k acknowledges."]);
 }

@@ -44,6 +44,8 @@ fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
             &[&["study", "enqueue", study.to_str().unwrap()][..], &point.map(|p| p as &str)].concat(),
         ));
     }
+    // Regression: the proposal changed, and the log alone said why.
+    session.wait_for(&["another program has changed the queue: another point is proposed"]);
     session.send("N");
     session.wait_for(&[
         "Queue",

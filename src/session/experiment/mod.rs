@@ -298,7 +298,7 @@ impl Experiment {
                     self.log("other workers have run the trials that were left".to_owned());
                     self.propose()?;
                 } else if next != open.waits_as() && !open.is_changed() {
-                    self.log("another program has changed the queue: a new proposal follows".to_owned());
+                    self.warn("another program has changed the queue: another point is proposed".to_owned());
                     self.propose()?;
                 }
                 self.publish_changes()?;

@@ -129,8 +129,11 @@ fn live(model: &Model) -> NextStep {
             let stopped = stopped(model);
             let because = match cause.is_empty() || is_stop || stopped == FELL && waiting.is_some() {
                 true => String::new(),
-                // Of an observer the name is enough: the keys of the verdict need the room.
-                false => format!(": {}", cause.strip_suffix(WHO_WATCHES).unwrap_or(cause)),
+                // Of an observer the name is enough: the keys of the verdict need the room. That it fell is said already.
+                false => {
+                    let cause = cause.strip_suffix(WHO_WATCHES).unwrap_or(cause);
+                    format!(": {}", cause.strip_prefix("fell: ").filter(|_| stopped == FELL).unwrap_or(cause))
+                }
             };
             // The key first: a long reason may be cut.
             let mut lead =
