@@ -138,7 +138,7 @@ fn arming_says_that_a_robot_which_needs_no_approval_jumps() {
     };
     for approve in [Approval::FallsOnly, Approval::Auto] {
         let (arm, question, stands) = armed(approve, Backend::Simulator);
-        assert_eq!(arm, "Press A to arm: the robot stands up and jumps without a question.");
+        assert_eq!(arm, "Press A to arm: it stands up, then jumps without a question.");
         assert_shows(
             &question,
             &["The robot will stand up and jump without a question.", "arm: it stands up and jumps"],

@@ -2,7 +2,9 @@
 
 use crate::support::{Console, assert_shows, line_with, session, tick, trial};
 use quadfrog::engine::ObserverStatus;
-use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, StageRecord, Transition};
+use quadfrog::recording::record::{
+    ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, StageRecord, Transition,
+};
 use quadfrog::report::table;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
@@ -10,8 +12,8 @@ use quadfrog::telemetry::{
     ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TransitionCause, TrialInhibit,
 };
 use quadfrog::trial::{
-    Backend, DrawnRange, ExperimentStage, PointRecord, ProposalSource, SearchStatus, SearchedParameter, TrialRecord,
-    Verdict,
+    Approval, Backend, DrawnRange, ExperimentStage, PointRecord, ProposalSource, SearchStatus, SearchedParameter,
+    TrialRecord, Verdict,
 };
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::text::as_text;
@@ -237,6 +239,13 @@ fn the_step_before_arming_says_that_a_fallen_simulated_robot_is_turned_upright()
     assert_shows(last, &["Press A to arm: the robot is turned upright and stands.", "o override"]);
     let narrow = console.screen(60, 20);
     assert_shows(&narrow, &["turned upright", "? help"]);
+    // Regression: where falls alone are judged the sentence was cut, and the key of the help was gone.
+    let mut info = session();
+    info.approve = Approval::FallsOnly;
+    console.record(Record::Session(info));
+    let screen = console.screen(80, 24);
+    let last = screen.lines().last().unwrap();
+    assert_shows(last, &["Press A to arm: it is turned upright, then jumps without a question.", "? more"]);
 }
 
 /// Regression: the card of a landed trial cut the cause of its suggested verdict at 80 columns.
@@ -449,4 +458,40 @@ fn repeats_do_not_count() {
     console.record(Record::Trial(repeat));
     console.stage(ExperimentStage::Finished, 1);
     assert_shows(&console.screen(120, 40), &["1 of 20 counted"]);
+}
+
+/// The sentence of the next step is whole at 80 columns, whatever the mode, the stage and the rule of approval are. The reason of a
+/// fault may be cut.
+#[test]
+fn the_next_step_is_never_cut_at_80_columns() {
+    use ExperimentStage::{Finished, Proposed, Review, Running};
+    let mut cut = std::collections::BTreeSet::new();
+    let mut draw = |mode: Mode, stage: ExperimentStage, approve: Approval, lies: bool, view: &str| {
+        let mut console = Console::ready();
+        console.record(Record::Session(SessionInfo { approve, ..session() }));
+        console.record(Record::Trial(trial(5, Some(Verdict::Accept), Some(Verdict::Accept))));
+        if stage == Review {
+            console.record(Record::Trial(trial(6, None, Some(Verdict::Fall))));
+        }
+        console.record(Record::Stage(StageRecord { stage, trial: 6, can_undo: stage == Proposed, jumps: 0 }));
+        let cause =
+            if mode == Mode::Fault { TransitionCause::Stop } else { TransitionCause::Fell(FallCause::BodyContact) };
+        console.record(Record::Transition(Transition { from: Mode::Jump, to: mode, cause: cause.to_string() }));
+        console.mode_of_ticks(mode);
+        console.model.snapshot.tick.estimate.roll_pitch_yaw.x = if lies { 3.0 } else { 0.0 };
+        console.press(&[view]);
+        let screen = console.screen(80, 24);
+        let last = screen.lines().last().unwrap();
+        if last.contains("..") {
+            cut.insert(format!("{mode:?} {stage:?} {approve:?}: {last}"));
+        }
+    };
+    for &mode in Mode::ALL {
+        for stage in [Proposed, Running, Review, Finished] {
+            for approve in Approval::ALL {
+                [(false, "1"), (true, "2")].map(|(lies, view)| draw(mode, stage, approve, lies, view));
+            }
+        }
+    }
+    assert!(cut.is_empty(), "{cut:#?}");
 }

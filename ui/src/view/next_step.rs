@@ -8,6 +8,7 @@ use quadfrog::trial::{ExperimentStage, Verdict};
 
 use super::{countdown, row_keys};
 use crate::action::Action;
+use crate::layout::MIN_COLUMNS;
 use crate::legal::{legal, may_request, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
 use crate::model::Model;
@@ -136,8 +137,11 @@ fn live(model: &Model) -> NextStep {
                 }
             };
             // The key first: a long reason may be cut.
-            let mut lead =
-                format!("{stopped}; check the robot, then {} acknowledges{because}", key(Action::Acknowledge));
+            let acknowledge = key(Action::Acknowledge);
+            let mut lead = format!("{stopped}; check the robot, then {acknowledge} acknowledges{because}");
+            if lead.chars().count() + 2 > usize::from(MIN_COLUMNS) {
+                lead = format!("{stopped}; check it, {acknowledge} acknowledges{because}");
+            }
             if let Some(trial) = waiting.filter(|_| !review) {
                 lead += &format!(". Trial {trial} waits for its verdict");
             }
@@ -175,12 +179,12 @@ fn live(model: &Model) -> NextStep {
                 _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
                 0 => {
                     let stands = match (model.simulated_robot_lies(), session.jumps_without_question()) {
-                        (true, true) => "is turned upright, stands and jumps without a question",
-                        (true, false) => "is turned upright and stands",
-                        (false, true) => "stands up and jumps without a question",
-                        (false, false) => "stands up",
+                        (true, true) => "it is turned upright, then jumps without a question",
+                        (true, false) => "the robot is turned upright and stands",
+                        (false, true) => "it stands up, then jumps without a question",
+                        (false, false) => "the robot stands up",
                     };
-                    format!("Press {} to arm: the robot {stands}.", key(Action::Arm))
+                    format!("Press {} to arm: {stands}.", key(Action::Arm))
                 }
                 1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
                 failing => {
