@@ -48,7 +48,7 @@ pub struct Recordings {
     pub operators: BTreeSet<String>,
     /// Versions of quadfrog that wrote them, each with its commit.
     pub programs: BTreeSet<String>,
-    /// Damaged and unreadable recordings, as sentences.
+    /// Damaged, unreadable and incompletely recovered recordings, as sentences.
     pub damages: Vec<String>,
 }
 
@@ -92,6 +92,8 @@ impl Recordings {
         }
         let is_ended = ticks.last().is_some_and(|last| last.trial == last_ended);
         self.end(&mut ticks, robot, is_ended);
+        let lost_before = player.lost_before_recovery();
+        self.damages.extend(lost_before.into_iter().map(|lost| format!("{}: {lost}", player.path().display())));
         self.damages.extend(player.damage());
     }
 

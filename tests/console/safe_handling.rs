@@ -235,6 +235,9 @@ fn a_whole_recording_is_not_recovered_and_a_damaged_one_names_how_its_study_read
     fs::rename(&file, program.path("damaged.mcap")).unwrap();
     fs::rename(&recovered, &file).unwrap();
     assert_shows(&program.text(&["replay", "--check", study.to_str().unwrap()]), &["not whole: 1 of "]);
+    // Regression: a report of the recovered file said nothing.
+    let report = program.text(&["report", study.to_str().unwrap()]).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_shows(&report, &["session.mcap: recovered from a file that was not whole: 1 of "]);
     // Regression: of a name without a file the ending was refused.
     let missing = study.join("nothing.part");
     let refused = program.refused(&["recover", missing.to_str().unwrap()]);

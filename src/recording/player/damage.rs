@@ -70,13 +70,14 @@ impl Player {
         Ok(found)
     }
 
-    /// Returns what was lost already when the file was recovered from a damaged one, one description for each recovery.
+    /// Returns what was lost already when the file was recovered from a damaged one, one line for each recovery.
     /// [`Player::check_extras`] names metadata that cannot be read.
     pub fn lost_before_recovery(&mut self) -> Vec<String> {
         let spans = self.container.metadata.clone();
         let read = spans.into_iter().filter_map(|span| self.container.read_metadata(span).ok().flatten());
         let recoveries = read.filter(|metadata| metadata.name == recover::RECOVERED);
-        recoveries.filter_map(|mut metadata| metadata.metadata.remove(recover::LOST)).collect()
+        let lost = recoveries.filter_map(|mut metadata| metadata.metadata.remove(recover::LOST));
+        lost.map(|lost| format!("recovered from a file that was not whole: {lost}")).collect()
     }
 
     /// Returns the reason for which the end of the file is missing; none for a finished file.

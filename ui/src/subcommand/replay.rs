@@ -216,7 +216,7 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
     }
     let lost_before = player.lost_before_recovery();
     for lost in &lost_before {
-        put_line!("  recovered from a file that was not whole: {lost}");
+        put_line!("  {lost}");
     }
     if written && extras.is_empty() && lacks_its_end_alone(&player) {
         put_line!("  a session still writes it");
