@@ -40,6 +40,17 @@ impl RejudgedTrial {
     }
 }
 
+/// Returns in words how many of the trials get another suggested verdict, and how many others another value or reason.
+pub fn changes_in_words<'a>(trials: impl Iterator<Item = &'a RejudgedTrial> + Clone) -> String {
+    let changed = trials.clone().filter(|trial| trial.new.verdict != trial.old.verdict).count();
+    let differ = trials.clone().filter(|trial| trial.new.differs(&trial.old)).count();
+    let others = match differ - changed {
+        0 => String::new(),
+        others => format!(", of {others} others J or the cause"),
+    };
+    format!("{changed} of {} suggestions change{others}", trials.count())
+}
+
 /// The recomputed estimate of a trial beside the recorded one; of several rollouts the largest numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EstimateChange {

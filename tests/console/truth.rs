@@ -312,6 +312,18 @@ fn a_followed_recording_says_how_old_what_it_shows_is() {
     assert_shows(&last, &["q quit"]);
 }
 
+/// Regression: an observer of a session that continued a study saw what the session before had answered, minutes ago.
+#[test]
+fn an_answer_of_the_session_before_is_not_shown_in_the_next() {
+    let mut console = Console::ready();
+    let session_of = |started: &str| Record::Session(SessionInfo { started: started.to_owned(), ..session() });
+    console.record(session_of("2026-11-27T16:00:00Z"));
+    console.answer("fall", true, "trial 23; u takes it back until the next trial");
+    assert_shows(console.said(), &["u takes it back"]);
+    console.record(session_of("2026-11-27T16:04:17Z"));
+    assert!(console.model.message.is_none());
+}
+
 /// Regression: the details of a trial whose verdict could be undone said that its value was reported.
 #[test]
 fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use quadfrog::engine::RejudgedTrial;
+use quadfrog::engine::{RejudgedTrial, changes_in_words};
 use quadfrog::trial::Verdict;
 
 /// New judgements beside the recorded ones.
@@ -21,14 +21,11 @@ pub struct RejudgedTable {
 }
 
 impl RejudgedTable {
-    /// The number of suggested verdicts, values and reasons that change, and of those judged while they are.
+    /// The numbers of suggested verdicts, values and reasons that change, and of those judged while they are.
     pub fn summary(&self) -> String {
-        let changed = self.trials.values().filter(|trial| trial.new.differs(&trial.old)).count();
-        let (judged, count) = (self.trials.len(), self.count);
-        if self.done {
-            format!("{changed} of {judged} suggestions change")
-        } else {
-            format!("{judged} of {count} judged again")
+        match self.done {
+            true => changes_in_words(self.trials.values()),
+            false => format!("{} of {} judged again", self.trials.len(), self.count),
         }
     }
 

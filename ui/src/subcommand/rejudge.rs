@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::put_line;
 use clap::Args;
-use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging};
+use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::session::rejudge::Judgement;
 use quadfrog::trial::Verdict;
@@ -92,10 +92,9 @@ fn print(results: &[RejudgedTrial], unit: &str) {
             "trial {trial}: the estimate is recomputed, at most {distance_m:.4} m from the recorded one; error at the end {old}, now {new}"
         );
     }
-    let changed = results.iter().filter(|result| result.new.differs(&result.old)).count();
     put_line!(
-        "{changed} of {} suggestions change; verdicts are those in force. J in {unit}, as measured; a fall counts as 0.",
-        results.len()
+        "{}; verdicts are those in force. J in {unit}, as measured; a fall counts as 0.",
+        changes_in_words(results.iter())
     );
 }
 

@@ -77,6 +77,10 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let continued = !known.recording.is_empty()
                 && (&info.started, info.started.is_empty()) == (&known.started, false)
                 && info.recording != known.recording;
+            if !continued && !known.started.is_empty() {
+                // An answer that an earlier session gave is none of this one.
+                model.message = None;
+            }
             model.session.info = info;
             if !continued {
                 log(model, time_ns, LogLevel::Info, "session", text, false);
