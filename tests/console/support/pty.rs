@@ -21,6 +21,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 struct Output {
     parser: vt100::Parser,
     bytes: Vec<u8>,
+    /// Time and number of bytes so far of each read.
+    reads: Vec<(Instant, usize)>,
 }
 
 /// A program in a terminal.
@@ -94,7 +96,7 @@ impl Session {
         let child = pair.slave.spawn_command(command).expect("started");
         drop(pair.slave);
         let parser = vt100::Parser::new(nonzero(rows), nonzero(columns), 0);
-        let output = Arc::new(Mutex::new(Output { parser, bytes: Vec::new() }));
+        let output = Arc::new(Mutex::new(Output { parser, bytes: Vec::new(), reads: Vec::new() }));
         let reading = Arc::new(AtomicBool::new(true));
         let mut terminal = pair.master.try_clone_reader().expect("a reader");
         let closed = Arc::new(AtomicBool::new(false));
@@ -113,6 +115,8 @@ impl Session {
                         let mut kept = kept.lock().expect("output");
                         kept.parser.process(&buffer[..count]);
                         kept.bytes.extend_from_slice(&buffer[..count]);
+                        let sent = kept.bytes.len();
+                        kept.reads.push((Instant::now(), sent));
                     }
                 }
             }
@@ -139,6 +143,13 @@ impl Session {
     /// The bytes sent to the terminal.
     pub fn sent_bytes(&self) -> Vec<u8> {
         self.output().bytes.clone()
+    }
+
+    /// Number of bytes sent before each pause of 20 ms or more.
+    pub fn bytes_before_pauses(&self) -> Vec<usize> {
+        let output = self.output();
+        let pause = |pair: &&[(Instant, usize)]| pair[1].0 - pair[0].0 >= Duration::from_millis(20);
+        output.reads.windows(2).filter(pause).map(|pair| pair[0].1).collect()
     }
 
     /// Whether the output contains these bytes.
