@@ -89,11 +89,24 @@ pub struct Chart<'a> {
     pub theme: Theme,
 }
 
-/// A series in the window, read once: a sample has half a kilobyte, and what a chart draws of it four bytes.
+/// A series in the window.
+#[derive(Default)]
 pub struct Curve {
     values: Vec<f32>,
     /// Empty for a series that is not commanded.
     commanded: Vec<f32>,
+}
+
+/// Returns the curve of each of these series. Each sample is read once: it has half a kilobyte, and a curve takes four bytes of it.
+pub fn curves(styles: &[SeriesStyle], history: &SignalHistory, axis: &TimeAxis) -> Vec<Curve> {
+    let mut curves: Vec<Curve> = styles.iter().map(|_| Curve::default()).collect();
+    for sample in history.window(axis.window_ns) {
+        for (style, curve) in styles.iter().zip(&mut curves) {
+            curve.values.push(style.value(sample));
+            curve.commanded.extend(style.commanded(sample));
+        }
+    }
+    curves
 }
 
 /// Time of a sample, ns, and its column of dots; none outside of the window.
@@ -106,26 +119,25 @@ pub fn sample_columns(axis: &TimeAxis, history: &SignalHistory, width: u16, glyp
 }
 
 impl SeriesStyle {
-    pub fn curve(&self, history: &SignalHistory, axis: &TimeAxis) -> Curve {
-        let samples = || history.window(axis.window_ns);
-        Curve {
-            values: samples().map(|sample| self.value(sample)).collect(),
-            commanded: samples().map_while(|sample| self.commanded(sample)).collect(),
-        }
-    }
-
     /// The first of the series' ranges that holds what is drawn of it.
     pub fn range_of(&self, curve: &Curve, ghost: Option<Ghost<'_>>) -> usize {
-        let ghost = ghost.iter().flat_map(|ghost| ghost.trace);
-        let ghost = ghost.flat_map(|sample| [Some(self.value(sample)), self.commanded(sample)]).flatten();
-        let (low, high) = curve
-            .values
-            .iter()
-            .chain(&curve.commanded)
-            .copied()
-            .chain(ghost)
-            .filter(|value| value.is_finite())
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut widen = |value: f32| {
+            // No comparison with NaN holds.
+            let value = if value.is_finite() { value } else { f32::NAN };
+            low = if value < low { value } else { low };
+            high = if value > high { value } else { high };
+        };
+        for value in &curve.values {
+            widen(*value);
+        }
+        for value in &curve.commanded {
+            widen(*value);
+        }
+        for sample in ghost.iter().flat_map(|ghost| ghost.trace) {
+            widen(self.value(sample));
+            self.commanded(sample).into_iter().for_each(&mut widen);
+        }
         let holds = |range: &(f32, f32)| low >= range.0 && high <= range.1;
         self.ranges.iter().position(holds).unwrap_or(self.ranges.len().saturating_sub(1))
     }
@@ -346,11 +358,15 @@ fn trace(dots: &mut DotGrid, points: impl Iterator<Item = (SampleColumn, f32)>, 
     if across == 0 || down == 0 {
         return;
     }
+    let dots_per_unit = down as f32 / (high - low);
     let mut before: Option<(u64, usize, i64)> = None;
     for ((time_ns, column), value) in points {
         before = column.filter(|_| value.is_finite()).map(|x| {
-            let y = ((high - value) / (high - low) * down as f32) as i64;
+            let y = ((high - value) * dots_per_unit) as i64;
             let y = y.clamp(0, down as i64 - 1);
+            if before.is_some_and(|(_, x0, y0)| (x0, y0) == (x, y)) {
+                return (time_ns, x, y);
+            }
             // Joined to the sample before in this or the next column, or in a thinned trace; not to one at the other end of
             // the chart, nor over a gap in which nothing was received.
             let joined = |(t0, x0, _): &(u64, usize, i64)| {

@@ -19,24 +19,19 @@ pub fn dots_across(width: u16, glyphs: Glyphs) -> usize {
     usize::from(width) * resolution(glyphs).0
 }
 
-/// The character with these dots set (`dots[x][y]`, from the top).
-fn character(glyphs: Glyphs, dots: &[[bool; 4]; 2]) -> char {
-    // Unicode 16, Braille Patterns: bits of the dots 1-8, by column and row.
-    const BRAILLE: [[u32; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
+/// The bit of each dot of a character, by column and row (Unicode 16, Braille Patterns).
+const BITS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
+
+/// The character with these dots set, the bits of [`BITS`].
+fn character(glyphs: Glyphs, dots: u8) -> char {
     if glyphs == Glyphs::Braille {
-        let mut bits = 0;
-        for x in 0..2 {
-            for y in 0..4 {
-                bits |= if dots[x][y] { BRAILLE[x][y] } else { 0 };
-            }
-        }
-        return char::from_u32(0x2800 + bits).unwrap_or(' ');
+        return char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' ');
     }
     let (middle, several) = if glyphs == Glyphs::Dots { ('·', ':') } else { ('-', '|') };
-    match dots[0] {
-        [true, false, false, _] => '\'',
-        [false, true, false, _] => middle,
-        [false, false, true, _] => '.',
+    match dots {
+        0x01 => '\'',
+        0x02 => middle,
+        0x04 => '.',
         _ => several,
     }
 }
@@ -45,20 +40,29 @@ pub struct DotGrid {
     glyphs: Glyphs,
     /// Dots across and down.
     pub size: (usize, usize),
-    set: Vec<bool>,
+    /// The dots of each character, row by row.
+    set: Vec<u8>,
+    /// Characters across.
+    width: usize,
 }
 
 impl DotGrid {
     pub fn new(area: Rect, glyphs: Glyphs) -> DotGrid {
         let size = (dots_across(area.width, glyphs), usize::from(area.height) * resolution(glyphs).1);
-        DotGrid { glyphs, size, set: vec![false; size.0 * size.1] }
+        let width = usize::from(area.width);
+        DotGrid { glyphs, size, set: vec![0; width * usize::from(area.height)], width }
     }
 
     /// Sets a dot; outside of the grid nothing happens.
     pub fn set(&mut self, x: i64, y: i64) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
         if x < self.size.0 && y < self.size.1 {
-            self.set[y * self.size.0 + x] = true;
+            // With constants: a division by a variable takes longer than all else here.
+            let (column, row, bit) = match self.glyphs {
+                Glyphs::Braille => (x / 2, y / 4, BITS[x % 2][y % 4]),
+                Glyphs::Dots | Glyphs::Ascii => (x, y / 3, BITS[0][y % 3]),
+            };
+            self.set[row * self.width + column] |= bit;
         }
     }
 
@@ -78,19 +82,10 @@ impl DotGrid {
 
     /// Draws the characters that have dots; the others keep what lies below.
     pub fn draw(&self, buffer: &mut Buffer, area: Rect, style: Style) {
-        let (across, down) = resolution(self.glyphs);
-        for row in 0..usize::from(area.height) {
-            for column in 0..usize::from(area.width) {
-                let mut dots = [[false; 4]; 2];
-                let mut any = false;
-                for (x, dots) in dots.iter_mut().enumerate().take(across) {
-                    for (y, dot) in dots.iter_mut().enumerate().take(down) {
-                        *dot = self.set[(row * down + y) * self.size.0 + column * across + x];
-                        any |= *dot;
-                    }
-                }
-                if any && let Some(cell) = buffer.cell_mut((area.x + column as u16, area.y + row as u16)) {
-                    cell.set_char(character(self.glyphs, &dots)).set_style(style);
+        for (row, dots) in self.set.chunks(self.width.max(1)).enumerate() {
+            for (column, dots) in dots.iter().enumerate().filter(|(_, dots)| **dots != 0) {
+                if let Some(cell) = buffer.cell_mut((area.x + column as u16, area.y + row as u16)) {
+                    cell.set_char(character(self.glyphs, *dots)).set_style(style);
                 }
             }
         }

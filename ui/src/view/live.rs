@@ -8,7 +8,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::chart::{Chart, Curve, Ghost, TimeAxis, draw_phases, draw_time_axis, phases, plot_columns, sample_columns};
+use super::chart::{Chart, Ghost, TimeAxis, curves, draw_phases, draw_time_axis, phases, plot_columns, sample_columns};
 use super::draw::{NO_STATE, bar, heading, span, without_sign_of_zero};
 use super::series_style::{SeriesStyle, style};
 use super::{beside, objective, points, proposal, trials, wireframe};
@@ -230,7 +230,7 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     let rows = Layout::vertical(vec![Constraint::Fill(1); down]).split(charts);
     let middle_tick = rows.iter().all(|row| row.height > CHART_ROWS);
     let drawn: Vec<SeriesStyle> = series.iter().take(across * down).map(|series| style(*series, model)).collect();
-    let curves: Vec<Curve> = drawn.iter().map(|style| style.curve(&source.history, &source.axis)).collect();
+    let curves = curves(&drawn, &source.history, &source.axis);
     let own: Vec<usize> = drawn.iter().zip(&curves).map(|(style, curve)| style.range_of(curve, source.ghost)).collect();
     for (index, style) in drawn.iter().enumerate() {
         // Charts of the same quantity have the same axis.

@@ -12,6 +12,8 @@ use crate::theme::Role;
 #[derive(Clone, Copy)]
 pub struct SeriesStyle {
     pub series: Series,
+    /// What the series shows; read for every sample.
+    pub kind: SeriesKind,
     /// Ranges, narrowest first; the first one that holds the window's values is drawn.
     pub ranges: &'static [(f32, f32)],
     pub role: Role,
@@ -30,7 +32,7 @@ impl SeriesStyle {
             return f32::NAN;
         }
         let joints = &sample.joints;
-        match self.series.kind() {
+        match self.kind {
             SeriesKind::Tilt(axis) => [sample.roll, sample.pitch][axis],
             SeriesKind::Foot(leg) => sample.foot_z[leg],
             SeriesKind::Height => sample.height,
@@ -56,7 +58,7 @@ impl SeriesStyle {
 
     /// The command for its value in a sample, no number while the robot sends no states; none for a series that is not commanded.
     pub fn commanded(&self, sample: &ChartSample) -> Option<f32> {
-        let commanded = match self.series.kind() {
+        let commanded = match self.kind {
             SeriesKind::Angle(joint) => sample.joints.commanded_angle[joint],
             SeriesKind::Torque(joint) => sample.joints.commanded_torque[joint],
             _ => return None,
@@ -101,7 +103,7 @@ pub fn style(series: Series, model: &Model) -> SeriesStyle {
     };
     let simulated = model.session.info.backend == Some(Backend::Simulator);
     let limits = limits(kind, model).unwrap_or([f32::NAN; 2]);
-    SeriesStyle { series, ranges, role, foot: series.foot(), simulated, limits }
+    SeriesStyle { series, kind, ranges, role, foot: series.foot(), simulated, limits }
 }
 
 /// The limits of a series, as far as they are known: of the fall detector, of the joints, and the motors' temperature that is
