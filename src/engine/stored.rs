@@ -7,9 +7,10 @@ use super::folder::{STUDY_FILE, study_files};
 use crate::config::Config;
 use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
+use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
-use crate::optimize::trial::{Distribution, Trial, TrialState};
+use crate::optimize::trial::{Distribution, Trial};
 use crate::session::experiment::rows_of;
 use crate::session::experiment::study_attributes::StudyAttributes;
 use crate::trial::{ParameterInfo, Task, TrialRecord, Verdict};
@@ -67,18 +68,19 @@ impl Opened {
         rows_of(&self.study, &self.parameters)
     }
 
-    /// Returns the row of the best trial, with a verdict that its session can still take back, as that session shows it.
+    /// Returns the row of the best trial, as a session shows it: by the sampler's model if that was stored after the newest trial,
+    /// else the accepted trial whose point has the greatest value, the earliest of equals. A verdict that its session can still take
+    /// back counts.
     pub fn best<'a>(&self, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
-        let stored = self.study.best().and_then(|best| rows.iter().find(|row| row.trial == best.number));
-        let judged = |row: &&TrialRecord| {
-            let running = self.study.trial(row.trial).is_ok_and(|trial| trial.state == TrialState::Running);
-            // A repeat counts with the others of its point.
-            running && row.verdict == Some(Verdict::Accept) && row.parent.is_none()
-        };
-        let best_first = |a: &&TrialRecord, b: &&TrialRecord| {
-            self.study.options().direction.best_first(a.value.unwrap_or(f64::NAN), b.value.unwrap_or(f64::NAN))
-        };
-        stored.into_iter().chain(rows.iter().filter(judged)).filter(|row| row.value.is_some()).min_by(best_first)
+        if let Some(best) = self.study.model_best() {
+            return rows.iter().find(|row| row.trial == best.trial);
+        }
+        let points = points(self.study.trials());
+        let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
+        let feasible = |row: &&TrialRecord| self.study.trial(row.trial).is_ok_and(|trial| trial.violation() <= 0.0);
+        let accepted = rows.iter().filter(|row| row.verdict == Some(Verdict::Accept)).filter(feasible);
+        let candidates = accepted.filter_map(|row| Some((row, row.trial, row.value?)));
+        improvements(candidates, mean, self.study.options().direction).last()
     }
 }
 

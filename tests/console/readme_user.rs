@@ -402,6 +402,16 @@ fn a_trial_that_was_not_run_is_named_so_wherever_the_playhead_is() {
     assert_shows(&console.screen(80, 24), &["trial 7 was not run"]);
 }
 
+/// Regression: for one screen after the jump the last line said that the sampler was choosing the next trial.
+#[test]
+fn between_the_jump_and_its_measured_values_no_next_trial_is_named() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    console.mode(Mode::Review);
+    let last = last(&console, 80);
+    assert!(last.contains("Measuring the jump.") && !last.contains("sit down"), "{last}");
+}
+
 /// Trial 1 is proposed, and the verdict of trial 0 can still be taken back.
 fn proposed_after_a_verdict() -> Console {
     let mut console = Console::review(Mode::Review, Verdict::Accept);

@@ -127,6 +127,46 @@ fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
     );
 }
 
+/// Regression: an accepted re-run was the best of its session alone as long as `u` could take the verdict back, and a trial in which
+/// the program was killed ran for ever.
+#[test]
+fn readers_of_a_study_see_its_best_trial_at_once_and_that_its_session_was_killed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    session.send("r");
+    session.wait_for(&["Trial #1 (", "Press g twice"]);
+    session.approve();
+    session.wait_for(&["Trial #1: judge it", "TRIAL #1"]);
+    session.send("=");
+    session.wait_for(&["displacement forward, start to rest; the robot measured"]);
+    session.send("0.7\r");
+    session.wait_for(&["0.7 m counts instead of the measured value"]);
+    session.send("a");
+    session.wait_for(&["best 0.700 m by hand (#1)", "Press g twice"]);
+    let study = study_in(folder.path());
+    let study = study.to_str().expect("a name");
+    let best = |words: &[&str]| quadfrog(folder.path(), &[words, &[study]].concat());
+    for (words, expected) in [(["study", "best"], "Best: trial 1 "), (["study", "show"], "*1 ")] {
+        let shown = best(&words);
+        assert!(shown.contains(expected), "{words:?}: {shown}");
+    }
+    assert!(best(&["report"]).contains("0.700 h"), "{}", best(&["report"]));
+
+    session.approve();
+    session.wait_until("the jump", || session.screen().starts_with(" JUMP"));
+    assert!(best(&["study", "show"]).contains("1 running, 0 queued"), "{}", best(&["study", "show"]));
+    session.signal(nix::sys::signal::Signal::SIGKILL);
+    session.wait();
+    let shown = best(&["study", "show"]);
+    assert!(shown.contains("Trial 2 was interrupted: its session ended within it"), "{shown}");
+    assert!(!shown.contains("running"), "{shown}");
+}
+
 /// Regression: under automatic approval an edit in the table of a finished study made the robot arm itself and jump.
 #[test]
 fn a_changed_verdict_of_a_finished_study_moves_no_robot() {

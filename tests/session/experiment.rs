@@ -3,6 +3,8 @@
 use crate::support;
 use std::time::Duration;
 
+use quadfrog::config::Config;
+use quadfrog::engine::{STUDY_FILE, open_stored};
 use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{Trial, TrialState};
@@ -250,6 +252,33 @@ fn an_undone_verdict_is_neither_counted_nor_the_best() {
     });
     assert_eq!((counted, experiment.counted()), (Some(1), 1));
     assert_eq!(experiment.best().map(|best| best.trial), Some(first.trial));
+}
+
+/// Regression: of a re-run whose verdict could be taken back a reader of the study knew no value.
+#[test]
+fn a_reader_of_the_study_has_the_same_best_as_the_session_after_every_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let read = || {
+        let storage = Storage::File(folder.path().join(STUDY_FILE));
+        let opened = open_stored(&storage, None, &Config::load(None).unwrap()).unwrap();
+        opened.best(&opened.rows()).map(|best| best.trial)
+    };
+    let mut judged = |experiment: &mut Experiment, verdict, rerun, value| {
+        let spec = run(experiment, TrialEnd::Settled);
+        experiment.set_hand_value(Some(value)).unwrap();
+        experiment.judge(verdict, rerun).unwrap();
+        assert_eq!(read(), experiment.best().map(|best| best.trial), "after trial {}", spec.trial);
+        read()
+    };
+    assert_eq!(judged(&mut experiment, Verdict::Accept, false, 0.4), Some(0));
+    assert_eq!(judged(&mut experiment, Verdict::Void, true, 0.9), Some(0));
+    assert_eq!(judged(&mut experiment, Verdict::Accept, false, 0.6), Some(2));
+    // The same point again: then the mean of both counts for the earlier one.
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Fall, false).unwrap();
+    assert_eq!(read(), Some(0));
+    assert_eq!(judged(&mut experiment, Verdict::Accept, false, 0.5), Some(3));
 }
 
 #[test]

@@ -408,6 +408,11 @@ pub fn waits_for_verdict(trial: &Trial) -> bool {
     trial.state == TrialState::Running && TrialAttributes::of(trial).is_unjudged()
 }
 
+/// Whether a running trial is of the session in its study's folder, not of a worker that has joined the study or of another program.
+pub fn is_of_folders_session(trial: &Trial) -> bool {
+    attributes::worker_of(trial) == Some(0)
+}
+
 /// Returns the name of the sampler with which a stored study was made or continued last.
 pub fn last_sampler(study: &Study) -> Option<String> {
     Some(study.attributes().get("sampler")?.get("kind")?.as_str()?.to_owned())

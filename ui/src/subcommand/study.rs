@@ -9,7 +9,10 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, StoredStudy, newest_config, open_stored, stored_studies, study_files, study_name};
+use quadfrog::engine::{
+    Opened, STUDY_FILE, StoredStudy, newest_config, open_stored, running_session, stored_studies, study_files,
+    study_name,
+};
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::Storage;
@@ -281,9 +284,17 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         let _ = writeln!(text, "Trial {} waits for its verdict{}", trial.number, by_hand.unwrap_or_default());
     }
     let undecided = |row: &&TrialRecord| row.verdict.is_none() && study.trial(row.trial).is_ok_and(|t| !unjudged(&t));
-    let (running, waiting) = (rows.iter().filter(undecided).count(), study.waiting().count());
-    if running + waiting > 0 {
-        let _ = writeln!(text, "{running} running, {waiting} queued");
+    let ended = session_has_ended(&parse_storage(&selector.place));
+    let (interrupted, running): (Vec<&TrialRecord>, Vec<&TrialRecord>) = rows
+        .iter()
+        .filter(undecided)
+        .partition(|row| ended && study.trial(row.trial).is_ok_and(experiment::is_of_folders_session));
+    for row in &interrupted {
+        let _ = writeln!(text, "Trial {} was interrupted: its session ended within it", row.trial);
+    }
+    let waiting = study.waiting().count();
+    if running.len() + waiting > 0 {
+        let _ = writeln!(text, "{} running, {waiting} queued", running.len());
         for queued in study.waiting() {
             let given = ParameterValues::from(queued.fixed());
             let value = |p: &ParameterInfo| Some(format!("{} {}", p.name, six_digits(given.get(&p.name)?)));
@@ -298,6 +309,14 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     }
     output::wrapped_text(&text, CONTINUED_INDENT);
     Ok(())
+}
+
+/// Whether the storage is that of a study's folder in which no session runs.
+fn session_has_ended(storage: &Storage) -> bool {
+    let Storage::File(file) = storage else { return false };
+    // Another file may be the journal of workers without a folder.
+    let folder = file.parent().filter(|_| file.ends_with(STUDY_FILE));
+    folder.is_some_and(|folder| running_session(folder).is_ok_and(|owner| owner.is_none()))
 }
 
 fn best_line(config: &Config, opened: &Opened, rows: &[TrialRecord]) -> String {

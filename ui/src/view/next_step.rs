@@ -216,6 +216,8 @@ fn live(model: &Model) -> NextStep {
             let short = format!("{press}.");
             NextStep { short, ..step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down]) }
         }
+        // The mode is shown a moment before the measured values arrive.
+        Mode::Review if stage == Some(ExperimentStage::Running) => step("Measuring the jump.", model, &[]),
         _ => step("The sampler is choosing the next trial.", model, &[sit_down]),
     }
 }
