@@ -169,7 +169,7 @@ pub static ACTIONS: [ActionInfo; 86] = {
         row(A::Fix, "fix", &["X"], G::Proposal, "Override: fix the parameter for the next trials, or search it again"),
         row(A::Bounds, "bounds", &["B"], G::Proposal, "Override: search the parameter within other bounds"),
         row(A::QueuePoint, "queue-point", &["Q"], G::Proposal, "queue this point ahead of the sampler's"),
-        row(A::Queue, "queue", &["N"], G::Proposal, "the queue: see, move and remove the points that run next"),
+        row(A::Queue, "queue", &["N"], G::Proposal, "the queue of the points that run next"),
         row(A::Skip, "skip", &["n"], G::Proposal, "skip the proposal, after a question; another follows"),
         row(A::Continue, "continue", &["C"], G::Proposal, "give a finished study more trials"),
         row(A::ConfirmBest, "confirm-best", &["K"], G::Proposal, "repeat the best points until one leads; again: end the repeats, after a question"),

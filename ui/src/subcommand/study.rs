@@ -50,7 +50,8 @@ enum StudySubcommand {
     },
     /// Export all trials as a table with the columns of Optuna's trials_dataframe
     ///
-    /// The column `duration` is the time from the proposal of a trial to its verdict, with the operator's pauses. Times are UTC.
+    /// A trial is complete once its verdict cannot be taken back: with the approval of the next one, or at the end of the session. The
+    /// column `duration` is the time from its approval to then, with the operator's pauses. Times are UTC.
     Export {
         #[command(flatten)]
         study: StudySelector,
