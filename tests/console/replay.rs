@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use crate::program::{Program, assert_shows};
 use crate::pty::Session;
+use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::SessionInfo;
@@ -219,6 +221,26 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
     session.wait_for(&[&fallen(*falls().last().unwrap())]);
     session.send("([");
     session.wait_for(&["no earlier trial or fault", "00:00.000"]);
+}
+
+/// Regression: a replay that was stopped for a while had played on meanwhile.
+#[test]
+fn a_replay_does_not_play_while_its_process_is_stopped() {
+    const STOPPED: Duration = Duration::from_secs(3);
+    let mut session = paused(&recording());
+    let begun = Instant::now();
+    session.send("p");
+    session.wait_until("it plays", || !session.screen().contains("paused"));
+    session.signal(Signal::SIGSTOP);
+    std::thread::sleep(STOPPED);
+    session.signal(Signal::SIGCONT);
+    session.send("p");
+    session.wait_for(&["paused"]);
+    let screen = session.screen();
+    let first = screen.lines().next().unwrap();
+    let clock = first.split_whitespace().find_map(|word| word.strip_prefix("00:")?.parse::<f64>().ok()).unwrap();
+    // However slow the machine is, it plays no longer than it runs, but for half a second in which it may be late.
+    assert!(clock <= (begun.elapsed() - STOPPED).as_secs_f64() + 0.5, "{clock} s in: {first}");
 }
 
 /// Regression: from the start of a recording `best` led nowhere, and later to the best before the playhead.

@@ -43,6 +43,8 @@ const LOW_BANDWIDTH_FRAMES: u32 = 2;
 
 /// Longest wait of the first frame for the terminal's report of its background. A later report changes the colours.
 const BACKGROUND_WAIT: Duration = Duration::from_millis(200);
+/// Longest time that a replay plays at once: what passes while the process is stopped is not played.
+const LONGEST_STEP: Duration = Duration::from_millis(500);
 
 /// Options of the console.
 #[derive(Debug, Clone)]
@@ -307,6 +309,9 @@ impl Console {
         let now = Instant::now();
         let elapsed = now.duration_since(self.last_feed);
         self.last_feed = now;
+        // An observer stays with its session.
+        let longest = if self.model.observer().is_none() { LONGEST_STEP } else { Duration::MAX };
+        let elapsed = elapsed.min(longest);
         let news = self.feed.poll(u64::try_from(elapsed.as_nanos()).unwrap_or(0));
         self.update_with(news);
         if let Some(jump) = self.earlier.as_ref().and_then(|earlier| earlier.try_recv().ok()) {
@@ -400,7 +405,6 @@ impl Console {
         // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);
         self.terminal_lost = true;
-        self.last_feed = Instant::now();
     }
 
     fn hang_up(&mut self) {
