@@ -412,6 +412,25 @@ fn between_the_jump_and_its_measured_values_no_next_trial_is_named() {
     assert!(last.contains("Measuring the jump.") && !last.contains("sit down"), "{last}");
 }
 
+/// Regression: of a re-run after a fall the card counted the falls of judged trials alone.
+#[test]
+fn a_re_run_of_a_point_that_fell_says_so() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, Some(Verdict::Void), Some(Verdict::Fall))));
+    let again = Proposal { parent: Some(0), source: ProposalSource::Rerun, ..proposal(1, 0) };
+    console.record(Record::Proposal(again.clone()));
+    console.stage(ExperimentStage::Proposed, 1);
+    for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+        assert_shows(&console.screen(columns, rows), &["this point fell in #0"]);
+    }
+    // With another value it is another point.
+    let mut changed = again;
+    changed.parameters[0].value += 0.1;
+    console.record(Record::Proposal(changed));
+    let screen = console.screen(120, 40);
+    assert!(!screen.contains("this point fell"), "{screen}");
+}
+
 /// Trial 1 is proposed, and the verdict of trial 0 can still be taken back.
 fn proposed_after_a_verdict() -> Console {
     let mut console = Console::review(Mode::Review, Verdict::Accept);

@@ -80,7 +80,8 @@ pub fn details(
             None if trial.verdict.is_some() => String::new(),
             None => ", no end so far".to_owned(),
         };
-        row("ran", format!("at {} of the session{took}", clock(ran.begun_ns)));
+        let what = if trial.did_not_jump() { "the countdown alone, " } else { "" };
+        row("ran", format!("{what}at {} of the session{took}", clock(ran.begun_ns)));
     } else if trial.verdict.is_some() {
         row("ran", if trial.was_not_run() { "not at all" } else { "not in this session" }.to_owned());
     }

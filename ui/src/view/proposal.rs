@@ -2,7 +2,8 @@
 //! best parameters when the study is finished.
 
 use quadfrog::trial::{
-    ExpectedResult, ExperimentStage, FallRisk, FixedParameter, PredictedTrial, ProposedParameter, TrialRecord, Verdict,
+    ExpectedResult, ExperimentStage, FallRisk, FixedParameter, PredictedTrial, Proposal, ProposedParameter,
+    TrialRecord, Verdict,
 };
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -81,6 +82,9 @@ fn content(model: &Model, width: usize) -> PanelText {
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
             lines.extend(expected(session, theme, proposal.expected));
+            if let Some(fallen) = void_fall(session, proposal) {
+                lines.push(Line::from(span(theme, Role::Warning, format!(" this point fell in #{fallen}"))));
+            }
             lines.push(risk(theme, proposal.risk, width));
             if let Some(share) = session.search.as_ref().and_then(|search| search.hop_share) {
                 let text = format!(" hop envelope: {:.0} % of force", 100.0 * share);
@@ -154,6 +158,14 @@ fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResu
         lines.push(Line::from(span(theme, Role::Warning, text)));
     }
     lines
+}
+
+/// The void trial of the same point in which the robot fell: the risk counts judged trials alone.
+fn void_fall(session: &SessionModel, proposal: &Proposal) -> Option<u32> {
+    let repeated = session.trials.records.get(&proposal.parent?)?;
+    let same = proposal.parameters.iter().chain(&proposal.gains).all(|p| p.value == p.proposed);
+    let fell = repeated.suggested == Some(Verdict::Fall) && repeated.verdict == Some(Verdict::Void);
+    (same && fell).then_some(repeated.trial)
 }
 
 fn risk(theme: &Theme, risk: Option<FallRisk>, width: usize) -> Line<'static> {
