@@ -493,6 +493,9 @@ fn of_a_trial_that_did_not_jump_void_and_the_same_again_are_left() {
     let last = last(&console, 120);
     assert_shows(&last, &["v void (suggested)", "r re-run"]);
     assert!(!last.contains("f fall") && !last.contains("by hand"), "{last}");
+    // Regression: its details said when it ran and how long, as those of a jump do.
+    console.press(&["2", "Enter"]);
+    assert_shows(&console.screen(120, 40), &["the countdown alone, at 00:00 of the session"]);
 }
 
 /// Regression: a trial of an earlier session, with which nothing is recorded here, was "no jump has been recorded yet".
