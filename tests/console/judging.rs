@@ -483,6 +483,13 @@ fn a_judged_row_is_queued_again_after_a_question() {
     assert_shows(&console.screen(80, 24), &["Queue it again?", "Press y to queue trial #0 again"]);
     assert_eq!(console.requests(&["x"]), []);
     assert_eq!(console.requests(&["r", "y"]), [OperatorRequest::Rerun { trial: Some(0) }]);
+    // Regression: the question did not say that typed values are lost by it.
+    let mut changed = proposal(2, 0);
+    changed.parameters[0].value += 0.1;
+    console.record(Record::Proposal(changed));
+    console.press(&["r"]);
+    let dropped = "The changed values of proposal #2 are dropped; Q queues them before.";
+    assert_shows(&console.screen(120, 40), &["Queue it again?", dropped]);
 }
 
 /// Regression: the question said that a simulated robot sits down, and nothing of the trial that was under way.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::Duration;
 
 use crate::pty::Session;
 use crate::skip::skip;
@@ -54,6 +55,34 @@ fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
         "#2    queued          f0 1.3",
     ]);
     (session, study)
+}
+
+/// Regression: the approval, the header and the log named the number that the queued point had, and the jump had another one.
+#[test]
+fn a_changed_proposal_is_approved_under_the_number_of_its_trial_beside_a_point_of_another_program() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "5"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["Press g twice"]);
+    session.send("o");
+    session.wait_for(&["Override trial #0"]);
+    session.send("1.2\r");
+    session.wait_for(&["trial 0 will run with f0 1.2 Hz"]);
+    // The question stays open: it is the same point.
+    session.send("g");
+    session.wait_for(&["to jump (trial #0)"]);
+    let study = study_of(folder.path());
+    text(&quadfrog(folder.path(), &["study", "enqueue", study.to_str().unwrap(), "f0=1.1"]));
+    session.wait_for(&["to jump (trial #1)", "Trial #1 (operator)"]);
+    assert!(session.screen().lines().next().unwrap().contains("trial #1 "), "{}", session.screen());
+    std::thread::sleep(Duration::from_secs(1));
+    session.send("g");
+    session.wait_for(&["approve trial 1: the countdown begins"]);
+    session.wait_for(&["Trial #1: judge it"]);
+    session.send("v");
+    session.wait_for(&["Trial #0 (queued)"]);
+    assert!(session.quit().success());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, RequestRefusal, confirmation_in_words, fixed_in_words};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, PointRecord, ProposalInsight, ProposalSource, SearchStatus, Verdict,
+    ExperimentStage, FixedParameter, PointRecord, Proposal, ProposalInsight, ProposalSource, SearchStatus, Verdict,
 };
 use support::{accept, approve, experiment, far, joined, open, plan, run, skip, study_in, ticks};
 
@@ -557,6 +557,35 @@ fn a_point_queued_by_another_program_comes_next() {
     assert_eq!(value(&experiment, "Fz"), 200.0);
     assert_eq!(accept(&mut experiment).jump.fz_n, 200.0);
     assert_eq!(value(&experiment, "Fx"), 78.0);
+}
+
+/// Regression: a changed proposal kept the number that the point of another program has in the study, and the seed of its noise.
+#[test]
+fn a_changed_proposal_has_the_number_of_its_trial_though_another_program_queues_a_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    let seen = experiment.proposal().unwrap();
+    assert_eq!(seen.trial, 0);
+    study_in(folder.path()).enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    experiment.take_records();
+    experiment.refresh().unwrap();
+    let now = experiment.proposal().unwrap();
+    assert_eq!(now, Proposal { trial: 1, ..seen.clone() });
+    assert_eq!(experiment.changed_proposal(), Some(1), "it keeps its changes over an undo and the end of the program");
+    let records = experiment.take_records();
+    let stage = |record: &Record| matches!(record, Record::Stage(stage) if stage.trial == 1);
+    assert!(records.contains(&Record::Proposal(now)) && records.iter().any(stage), "{records:?}");
+    experiment.refresh().unwrap();
+    assert_eq!(experiment.take_records(), [], "said once");
+    // Approved a moment before the new number was seen.
+    let spec = experiment.approve(seen.trial, seen.revision).unwrap();
+    assert_eq!((spec.trial, spec.jump.fz_n), (1, 200.0));
+    experiment.ended(1, &TrialEnd::Settled, &[], 0);
+    experiment.judge(Verdict::Void, false).unwrap();
+    let queued = accept(&mut experiment);
+    assert_eq!((queued.trial, queued.jump.fx_n), (0, 77.0));
+    assert_ne!(queued.seed, spec.seed, "no two trials have the same noise");
 }
 
 /// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.

@@ -50,6 +50,11 @@ impl Experiment {
         Ok(())
     }
 
+    /// Keeps the changes of the open proposal for the number that its trial has now.
+    pub(super) fn rename_kept_changes(&mut self, trial: u32) -> Result<(), StudyError> {
+        self.keep(self.kept_changes().map(|kept| KeptChanges { trial, ..kept }))
+    }
+
     pub(super) fn forget_changes(&mut self) -> Result<(), StudyError> {
         self.keep(None)
     }

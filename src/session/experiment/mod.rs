@@ -300,6 +300,8 @@ impl Experiment {
                 } else if next != open.waits_as() && !open.is_changed() {
                     self.warn("another program has changed the queue: another point is proposed".to_owned());
                     self.propose()?;
+                } else {
+                    self.renumber()?;
                 }
                 self.publish_changes()?;
             }
@@ -314,6 +316,25 @@ impl Experiment {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Gives the open proposal the number that its trial will have: another program has added trials. Its values and its revision
+    /// stay, and with them a question that is open.
+    fn renumber(&mut self) -> Result<(), StudyError> {
+        let next = self.study.trials().len() as u32;
+        let ExperimentState::Proposed(open) = &self.state else { return Ok(()) };
+        if open.waits_as().is_some() || open.number() == next {
+            return Ok(());
+        }
+        self.rename_kept_changes(next)?;
+        let ExperimentState::Proposed(open) = &mut self.state else { return Ok(()) };
+        open.set_number(next);
+        if open.is_changed() {
+            self.warn(format!("another program has added trials: {}", self.overrides_in_words()));
+        }
+        self.publish_proposal();
+        self.publish_stage(next);
         Ok(())
     }
 
@@ -369,6 +390,10 @@ impl Experiment {
 
     fn enter(&mut self, state: ExperimentState, trial: u32) {
         self.state = state;
+        self.publish_stage(trial);
+    }
+
+    fn publish_stage(&mut self, trial: u32) {
         let between = matches!(self.state, ExperimentState::BetweenRepeats(_));
         let (stage, can_undo) = (self.stage(), between || self.pending_verdict.is_some());
         let jumps = if stage == ExperimentStage::Running { self.spec(trial).jumps } else { 0 };

@@ -89,6 +89,11 @@ impl OpenProposal {
         must_be((self.number(), self.revision), (trial, revision))
     }
 
+    /// Sets the number that its trial will have; the values and the revision stay.
+    pub fn set_number(&mut self, number: u32) {
+        self.draft.number = number;
+    }
+
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
     pub fn waits_as(&self) -> Option<u32> {
         (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())

@@ -28,9 +28,10 @@ pub fn not_now<T>(reason: impl Into<String>) -> Result<T, RequestRefusal> {
     Err(RequestRefusal::NotNow(reason.into()))
 }
 
-/// Refuses a request that was made for another proposal than the open one, each given by its trial and its revision.
+/// Refuses a request that was made for another proposal than the open one, each given by its trial and its revision. The trial may have
+/// another number by now.
 pub fn must_be(open: (u32, u32), seen: (u32, u32)) -> Result<(), RequestRefusal> {
-    if open == seen {
+    if open.1 == seen.1 {
         return Ok(());
     }
     let (trial, new) = (seen.0, open.0);

@@ -5,7 +5,9 @@ use std::time::Duration;
 use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
 use quadfrog::telemetry::{Fault, Mode, TransitionCause};
-use quadfrog::trial::{Approval, ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits};
+use quadfrog::trial::{
+    Approval, ExperimentStage, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits,
+};
 
 use super::request::{cancelled, reply, say};
 use crate::action::Action;
@@ -61,6 +63,26 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
     } else if stale {
         model.dialog = None;
         reply(model, LogLevel::Warning, "the question was closed: the situation has changed");
+    }
+}
+
+/// Gives what is shown of the open proposal its new number, where that is all that has changed: another program has added trials.
+fn renumber(model: &mut Model, proposal: &Proposal) {
+    let session = &mut model.session;
+    let Some(before) = session.open_proposal().filter(|before| before.revision == proposal.revision) else { return };
+    let (before, now) = (before.trial, proposal.trial);
+    let insight = session.insight.as_mut().map(|insight| &mut insight.trial);
+    let stage = session.stage.as_mut().map(|stage| &mut stage.trial);
+    let asked = match &mut model.dialog {
+        Some(
+            Dialog::Approve { trial, .. }
+            | Dialog::Confirm(Question::Skip { trial, .. } | Question::QueueProposed { trial }),
+        ) => Some(trial),
+        Some(Dialog::Override(form)) => Some(&mut form.trial),
+        _ => None,
+    };
+    for trial in [insight, stage, asked].into_iter().flatten().filter(|trial| **trial == before) {
+        *trial = now;
     }
 }
 
@@ -157,6 +179,7 @@ pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let values: Vec<String> = proposal.parameters.iter().map(value).collect();
             let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
             log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
+            renumber(model, &proposal);
             model.session.overrides.take(&proposal);
             model.session.proposal = Some(proposal);
         }

@@ -172,9 +172,16 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
                 }
                 Some(_) => "will be the proposal; the sampler's follows them".to_owned(),
             };
-            let text = format!("The parameters of trial #{trial} {follows}.");
-            let answer = answers(&model.theme, "y", "queue");
-            ("Queue it again?", vec![Line::from(text), Line::default(), answer])
+            let mut lines = vec![Line::from(format!("The parameters of trial #{trial} {follows}."))];
+            let replaced = model.session.open_proposal().filter(|_| before == 0);
+            if let Some(changed) = replaced.filter(|proposal| proposal.changed().next().is_some()) {
+                let (number, key) = (changed.trial, model.keymap.key(Action::QueuePoint));
+                lines.push(Line::from(format!(
+                    "The changed values of proposal #{number} are dropped; {key} queues them before."
+                )));
+            }
+            lines.extend([Line::default(), answers(&model.theme, "y", "queue")]);
+            ("Queue it again?", lines)
         }
         Question::JudgeAnyway { trial, verdict: Verdict::Fall } => {
             let Some(row) = model.session.not_to_fall() else { return ("Judge it a fall?", Vec::new()) };
