@@ -12,7 +12,7 @@ use crate::theme::Role;
 #[derive(Clone, Copy)]
 pub struct SeriesStyle {
     pub series: Series,
-    /// What the series shows; read for every sample.
+    /// Quantity that it shows; read for every sample.
     pub kind: SeriesKind,
     /// Ranges, narrowest first; the first one that holds the window's values is drawn.
     pub ranges: &'static [(f32, f32)],
