@@ -306,6 +306,29 @@ fn the_header_of_a_finished_study_names_the_last_trial_that_ran() {
     assert_shows(&console.screen(80, 24), &["trial #3 "]);
 }
 
+/// Regression: the last sentence of the form was cut, more so once values were changed.
+#[test]
+fn the_form_of_overrides_is_whole_at_60_columns_and_20_rows() {
+    let mut console = Console::ready();
+    console.press(&["o"]);
+    assert_shows(
+        &console.screen(60, 20),
+        &["This does not move the robot: it is approved like any", "other proposal."],
+    );
+    for value in ["1.4", "80", "250.5"] {
+        console.enter(value);
+        console.press(&["Down"]);
+    }
+    console.enter("7");
+    console.press(&["Esc"]);
+    let screen = console.screen(60, 20);
+    assert_shows(
+        &screen,
+        &["was 1.250", "was 75.00", "was 250", "7 was dropped: kp stays 400.0 N/m.", "drops its values."],
+    );
+    assert_shows(&screen, &["> kp", "k_att"]);
+}
+
 /// Regression: view Override had dashes in place of the values of the trial that counted down or ran.
 #[test]
 fn the_values_of_the_running_trial_are_in_view_override() {

@@ -412,7 +412,7 @@ fn a_check_reads_the_whole_file_and_prints_what_is_lost() {
         let printed = String::from_utf8_lossy(&output.stdout).into_owned();
         assert_eq!(output.status.code(), Some(1), "{name}: {printed}");
         assert_shows(&printed, parts);
-        assert_shows(&String::from_utf8_lossy(&output.stderr), &["1 of 1 files are damaged", "quadfrog recover"]);
+        assert_shows(&String::from_utf8_lossy(&output.stderr), &["not whole: 1 of 1 file; ", "quadfrog recover"]);
     }
 }
 

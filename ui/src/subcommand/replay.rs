@@ -142,16 +142,17 @@ impl From<RecordingError> for Failure {
 
 /// Reads every message of the files and prints what is lost.
 fn check(files: &[PathBuf]) -> Result<(), Failure> {
-    let mut damaged = 0;
+    let mut incomplete = 0;
     for file in files {
-        damaged += usize::from(!check_file(file)?);
+        incomplete += usize::from(!check_file(file)?);
     }
-    match damaged {
+    match incomplete {
         0 => Ok(()),
-        count => {
-            Err(anyhow!("{count} of {} files are damaged; quadfrog recover FILE keeps what can be read", files.len())
-                .into())
-        }
+        count => Err(anyhow!(
+            "not whole: {count} of {}; quadfrog recover FILE keeps what can be read",
+            counted(files.len(), "file")
+        )
+        .into()),
     }
 }
 

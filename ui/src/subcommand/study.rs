@@ -15,7 +15,7 @@ use quadfrog::engine::{
 };
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
-use quadfrog::optimize::study::Storage;
+use quadfrog::optimize::study::{Storage, Study};
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
@@ -368,7 +368,7 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
         _ => exchange::from_csv(&text),
     }
     .map_err(|error| refuse(&error))?;
-    let mut study = selector.open()?.study;
+    let Opened { mut study, ours, .. } = selector.open()?;
     // A point that was removed from the queue has never run: its row has no parameters.
     let (trials, without_parameters): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| !trial.parameters.is_empty());
@@ -399,8 +399,21 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    output::text(&format!("{} queued{left_out}\n", counted(points.len(), "point")));
+    output::text(&format!(
+        "{} queued{left_out}{}\n",
+        counted(points.len(), "point"),
+        until_continued(&study, ours.as_ref())
+    ));
     Ok(())
+}
+
+/// Says of a study that has all of its trials what makes a queued point run; empty for another study.
+fn until_continued(study: &Study, ours: Option<&StoredStudy>) -> &'static str {
+    let counted = study.trials().iter().filter(|trial| trial.state.is_observed()).count();
+    match ours.and_then(|ours| ours.budget).is_some_and(|budget| counted >= budget as usize) {
+        true => "; the study has all of its trials: it runs once `C` in the console gives more",
+        false => "",
+    }
 }
 
 fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> {
@@ -427,9 +440,7 @@ fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Fail
     let Opened { mut study, ours, .. } = selector.open()?;
     study.check_point(point)?;
     let number = study.enqueue(point, &[])?;
-    let counted = study.trials().iter().filter(|trial| trial.state.is_observed()).count();
-    let full = ours.and_then(|ours| ours.budget).is_some_and(|budget| counted >= budget as usize);
-    let then = if full { "; the study has all of its trials: it runs once `C` in the console gives more" } else { "" };
+    let then = until_continued(&study, ours.as_ref());
     output::text(&format!("Queued as trial {number}{then}\n"));
     Ok(())
 }

@@ -170,13 +170,18 @@ fn text_box(frame: &mut Frame, area: Rect, model: &Model, title: &str, lines: Ve
 }
 
 fn fixed_box(frame: &mut Frame, area: Rect, model: &Model, (title, width): (&str, u16), lines: &[Line]) {
-    let lines = wrap_all(lines, usize::from(width.saturating_sub(4)), 0);
+    let mut lines = wrap_all(lines, usize::from(width.saturating_sub(4)), 0);
+    if lines.len() + 2 > usize::from(area.height) {
+        // Room for every sentence.
+        lines.retain(|line| line.width() > 0);
+    }
     let inner = open_box(frame, area, model, title, width, lines.len() as u16 + 2);
     frame.render_widget(Paragraph::new(lines), inner);
 }
 
-/// Columns of a value of the form.
+/// Columns of a value of the form, and of its place between its bounds.
 const VALUE_WIDTH: usize = 8;
+const SCALE_WIDTH: usize = 14;
 
 /// The rows of the form; a number that is typed takes what the rest of its row leaves of `width` columns.
 fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'static>> {
@@ -184,11 +189,7 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
     let mut lines = Vec::new();
     for (index, row) in form.rows.iter().enumerate() {
         if row.gain && !form.rows[index.saturating_sub(1)].gain {
-            lines.push(Line::from(span(
-                theme,
-                Role::Quiet,
-                "  gains of the controller, for this trial alone; its J counts",
-            )));
+            lines.push(Line::from(span(theme, Role::Quiet, "  gains, for this trial alone; its J counts")));
         }
         let selected = index == form.selected;
         let symbol = if selected { ">" } else { " " };
@@ -197,11 +198,17 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
         let mut after = vec![
             span(theme, Role::Quiet, format!(" {:<9}", row.unit)),
             span(theme, Role::Quiet, format!(" {:>6} ", number(row.low))),
-            span(theme, Role::Quiet, scale(theme, row.value, row.low, row.high, 14)),
+            span(theme, Role::Quiet, scale(theme, row.value, row.low, row.high, SCALE_WIDTH)),
             span(theme, Role::Quiet, format!(" {:<6}", number(row.high))),
         ];
         if row.value != row.before {
-            after.push(span(theme, Role::Warning, format!(" was {}", number(row.before))));
+            let was = format!(" was {}", number(row.before));
+            let others: usize = spans.iter().chain(&after).map(Span::width).sum();
+            match others + VALUE_WIDTH + was.len() <= width {
+                true => after.push(span(theme, Role::Warning, was)),
+                // In place of the scale: a second line of the row would have no room.
+                false => after[2] = span(theme, Role::Warning, format!("{was:^SCALE_WIDTH$}")),
+            }
         }
         match &form.typing {
             Some(input) if selected => {
