@@ -186,6 +186,19 @@ fn the_command_is_dotted_beside_the_measurement() {
     assert!(dots(&commanded) > dots(&limp) + 5, "{commanded}\n{limp}");
 }
 
+/// Regression: the roll of a robot on its back, which jumps from pi to -pi and back, filled the chart.
+#[test]
+fn no_line_joins_two_angles_that_a_whole_turn_separates() {
+    let mut console = charting(&["roll"]);
+    console.ticks(0..2_000, |time_ms| if time_ms % 10 == 0 { 3.13 } else { -3.13 });
+    let screen = console.screen(120, 40);
+    // The chart ends at the line of its side panel, with the description of its axis.
+    let chart = screen.lines().map(|row| row.chars().take(76).collect::<String>());
+    let chart = chart.skip_while(|row| !row.starts_with("roll")).take_while(|row| !row.contains("sweep"));
+    let rows = chart.filter(|row| row.contains(|c| ('\u{2801}'..='\u{28ff}').contains(&c))).count();
+    assert_eq!(rows, 2, "the two values and nothing between:\n{screen}");
+}
+
 #[test]
 fn twelve_joints_are_in_numbers_at_120x40_in_one_order() {
     let mut console = charting(&["roll", "pitch"]);

@@ -164,7 +164,8 @@ impl Chart<'_> {
         let curves = [(&self.curve.commanded, Role::Ghost, true), (&self.curve.values, self.style.role, false)];
         for (values, role, dotted) in curves {
             let mut dots = DotGrid::new(plot, self.theme.glyphs);
-            trace(&mut dots, self.columns.iter().copied().zip(values.iter().copied()), (low, high), dotted);
+            let points = self.columns.iter().copied().zip(values.iter().copied());
+            trace(&mut dots, points, (low, high), self.style.largest_step(), dotted);
             dots.draw(buffer, plot, self.theme.style(role));
         }
         self.shade(buffer, plot);
@@ -289,7 +290,7 @@ impl Chart<'_> {
             ((time_ns, self.axis.column(time_ns, dots.size.0)), self.style.value(sample))
         });
         let points: Vec<_> = points.collect();
-        trace(&mut dots, points.into_iter(), range, ghost.named);
+        trace(&mut dots, points.into_iter(), range, self.style.largest_step(), ghost.named);
         dots.draw(buffer, plot, self.theme.style(ghost.role));
     }
 
@@ -353,13 +354,21 @@ pub fn draw_time_axis(buffer: &mut Buffer, area: Rect, axis: &TimeAxis, origin_n
 }
 
 /// Sets the dots of a line through the points, as far as the axis shows them; `dotted` leaves out two columns of four.
-fn trace(dots: &mut DotGrid, points: impl Iterator<Item = (SampleColumn, f32)>, (low, high): (f32, f32), dotted: bool) {
+/// Values farther apart than `largest_step` are not joined.
+fn trace(
+    dots: &mut DotGrid,
+    points: impl Iterator<Item = (SampleColumn, f32)>,
+    (low, high): (f32, f32),
+    largest_step: f32,
+    dotted: bool,
+) {
     let (across, down) = dots.size;
     if across == 0 || down == 0 {
         return;
     }
     let dots_per_unit = down as f32 / (high - low);
     let mut before: Option<(u64, usize, i64)> = None;
+    let largest_step = largest_step * dots_per_unit;
     for ((time_ns, column), value) in points {
         before = column.filter(|_| value.is_finite()).map(|x| {
             let y = ((high - value) * dots_per_unit) as i64;
@@ -369,8 +378,9 @@ fn trace(dots: &mut DotGrid, points: impl Iterator<Item = (SampleColumn, f32)>, 
             }
             // Joined to the sample before in this or the next column, or in a thinned trace; not to one at the other end of
             // the chart, nor over a gap in which nothing was received.
-            let joined = |(t0, x0, _): &(u64, usize, i64)| {
-                x.wrapping_sub(*x0) <= 1 || x > *x0 && time_ns.saturating_sub(*t0) <= THINNED_NS
+            let joined = |(t0, x0, y0): &(u64, usize, i64)| {
+                let near = x.wrapping_sub(*x0) <= 1 || x > *x0 && time_ns.saturating_sub(*t0) <= THINNED_NS;
+                near && (y - y0).abs() as f32 <= largest_step
             };
             let (x0, y0) = before.filter(joined).map_or((x, y), |(_, x0, y0)| (x0, y0));
             for column in (x0 + 1).min(x)..=x {

@@ -194,6 +194,7 @@ fn live(model: &Model) -> NextStep {
             };
             let short = match session.failing_checks() {
                 _ if session.arming_checks.is_empty() => String::new(),
+                0 if session.jumps_without_question() => format!("Press {} to arm: it then jumps.", key(Action::Arm)),
                 0 => format!("Press {} to arm.", key(Action::Arm)),
                 _ => format!("{} shows failed checks.", key(Action::ArmingChecks)),
             };

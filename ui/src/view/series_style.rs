@@ -50,6 +50,14 @@ impl SeriesStyle {
         }
     }
 
+    /// The largest difference of two samples that a line joins: half a turn of an angle that jumps by a whole turn.
+    pub fn largest_step(&self) -> f32 {
+        match self.kind {
+            SeriesKind::Tilt(_) => std::f32::consts::PI,
+            _ => f32::INFINITY,
+        }
+    }
+
     /// The contact of its foot in a sample; none for a series without a foot, of a silent robot, and while a simulated one is placed.
     pub fn contact(&self, sample: &ChartSample) -> Option<bool> {
         let known = sample.heard && !(self.simulated && sample.is_before_footing());
