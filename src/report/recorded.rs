@@ -71,7 +71,7 @@ impl Recordings {
         self.operators.extend(player.session().operator_in_words());
         self.with_ticks.extend(player.trials_with_ticks());
         let mut ticks: Vec<Tick> = Vec::new();
-        let mut last_ended = None;
+        let mut ended = BTreeSet::new();
         for played in player.by_ref() {
             let tick = match played {
                 Played::Tick(tick) => tick,
@@ -79,18 +79,22 @@ impl Recordings {
                     if let Record::Proposal(proposal) = &record {
                         self.overrides.take(proposal);
                     }
-                    last_ended = ended_trial(&record).or(last_ended);
+                    ended.extend(ended_trial(&record));
                     continue;
                 }
             };
             if ticks.last().is_some_and(|last| last.trial != tick.trial) {
                 self.end(&mut ticks, robot, true);
             }
-            if tick.trial.is_some() {
+            if let Some(trial) = tick.trial {
+                if ticks.is_empty() {
+                    // Another rollout of it begins.
+                    ended.remove(&trial);
+                }
                 ticks.push(*tick);
             }
         }
-        let is_ended = ticks.last().is_some_and(|last| last.trial == last_ended);
+        let is_ended = ticks.last().and_then(|last| last.trial).is_some_and(|trial| ended.contains(&trial));
         self.end(&mut ticks, robot, is_ended);
         let lost_before = player.lost_before_recovery();
         self.damages.extend(lost_before.into_iter().map(|lost| format!("{}: {lost}", player.path().display())));

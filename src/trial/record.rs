@@ -111,13 +111,14 @@ impl TrialRecord {
     }
 
     /// Returns the name of its verdict on screens and in reports; a trial that did not run has none, and one of another
-    /// program was not judged: it is complete or has failed. None while it runs or waits.
+    /// program is complete or has failed until it is judged here. None while it runs or waits.
     pub fn verdict_name(&self) -> Option<&'static str> {
-        Some(match (self.verdict?, self.source) {
+        let of_other_program = self.source == ProposalSource::OtherProgram && self.judged_by.is_none();
+        Some(match self.verdict? {
             _ if self.was_not_run() => "not run",
-            (Verdict::Accept, ProposalSource::OtherProgram) => "complete",
-            (Verdict::Void, ProposalSource::OtherProgram) => "failed",
-            (verdict, _) => verdict.name(),
+            Verdict::Accept if of_other_program => "complete",
+            Verdict::Void if of_other_program => "failed",
+            verdict => verdict.name(),
         })
     }
 
@@ -144,7 +145,11 @@ impl TrialRecord {
     pub fn operators_reason(&self) -> Option<(&str, String)> {
         let words = OperatorsWords::of(&self.cause)?;
         // Earlier versions have kept the words of all changes.
-        Some((words.reason, format!("{} ({})", words.act, self.cause_by_rule())))
+        Some(match self.cause_by_rule() {
+            // A trial of another program has none.
+            "" => (words.reason, words.act),
+            rule => (words.reason, format!("{} ({rule})", words.act)),
+        })
     }
 
     /// Returns the cause without the words of the operator: that of the rules.

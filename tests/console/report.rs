@@ -255,6 +255,24 @@ fn a_recording_that_was_cut_off_is_used_and_reported() {
     );
 }
 
+/// Regression: the best trial of a study without a screen, whose ticks end the file, had ticks "in part": later trials end after it.
+#[test]
+fn the_recorded_trial_of_a_study_without_a_screen_is_whole() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "5", "--seed", "5", "--output", "studies"]);
+    let study = program.study("studies").display().to_string();
+    let ticks = column(table(&page(&program, &[&study]), "Trials of"), "ticks");
+    assert!(ticks.iter().all(|ticks| ["yes", "no"].contains(&ticks.as_str().unwrap())), "{ticks:?}");
+    assert!(ticks.iter().any(|ticks| ticks == "yes"), "{ticks:?}");
+    assert!(program.text(&["replay", "--check", &study]).contains("whole"));
+    // Regression: a point that waits was denied by a number of trials that counted it.
+    assert!(program.text(&["study", "enqueue", &study, "f0=1.2"]).contains("Queued as trial 5"));
+    assert_shows(
+        &program.refused(&["report", &study, "--trials", "5"]),
+        &["--trials 5: no such trial has begun; the last one is 4"],
+    );
+}
+
 #[test]
 fn a_hardware_like_study_lists_the_keys_that_differ() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/hardware_like");
@@ -304,7 +322,7 @@ fn unusable_input_is_refused_with_the_remedy() {
     assert!(!program.path("elsewhere").exists());
     fs::create_dir(program.path("empty")).unwrap();
     assert_shows(&program.refused(&["report", "empty"]), &["no study in this folder", "give"]);
-    assert_shows(&program.refused(&["report", &study, "--trials", "99"]), &["--trials 99", "at most 5 trials"]);
+    assert_shows(&program.refused(&["report", &study, "--trials", "99"]), &["--trials 99", "the last one is 4"]);
     assert!(program.refused(&["report", &study, "--trials", "worst"]).contains("last-fall"));
     program.refused(&["report"]);
 }

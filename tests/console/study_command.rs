@@ -360,6 +360,22 @@ fn a_study_of_gp_that_ended_within_a_trial_continues_with_the_same_bits() {
     }
 }
 
+/// Regression: a recording, and any other file that was named in place of a study, was to be "repaired" by the removal of its first line.
+#[test]
+fn a_file_that_is_no_journal_is_not_to_be_repaired() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--seed", "0", "--output", "studies"]);
+    let recording = program.study("studies").join("session.mcap").display().to_string();
+    program.write("readme.md", "# A title\n\nand a text\n");
+    for file in [recording.as_str(), "readme.md"] {
+        for command in [&["study", "show", file][..], &["report", file]] {
+            let message = program.refused(command);
+            assert_shows(&message, &[file, "is no journal of a study (line 1: ", "give the study's folder"]);
+            assert!(!message.contains("repair"), "{message}");
+        }
+    }
+}
+
 /// Regression: after `--resume` with another sampler `study show` named that of the study's begin alone.
 #[test]
 fn a_study_names_its_last_sampler_and_which_trials_each_has_proposed() {

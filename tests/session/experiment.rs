@@ -304,6 +304,39 @@ fn a_hand_measured_value_replaces_the_measured_one_and_both_are_kept() {
     assert_eq!(row.measured.as_ref().unwrap().dx_m, far(&spec));
 }
 
+/// Regression: a trial of another program that was judged a fall or void could not be accepted again: its value was lost.
+#[test]
+fn a_trial_of_another_program_has_its_value_again_when_it_is_accepted_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let parameters: Vec<(String, f64)> =
+        [("f0", 1.3), ("Fx", 90.0), ("Fz", 240.0)].map(|(n, v)| (n.to_owned(), v)).into();
+    let table = |value, state| TableTrial {
+        state,
+        value,
+        parameters: parameters.clone(),
+        attributes: serde_json::Map::new(),
+        started: None,
+        completed: None,
+    };
+    let trials = vec![table(Some(0.45), TrialState::Complete), table(None, TrialState::Fail)];
+    import(&mut study_in(folder.path()), trials).unwrap();
+    let mut experiment = open(folder.path());
+    let name = |experiment: &Experiment, trial| experiment.row(trial).unwrap().verdict_name().unwrap();
+    assert_eq!([name(&experiment, 0), name(&experiment, 1)], ["complete", "failed"]);
+    assert_eq!(experiment.change_verdict(0, Verdict::Fall, "it lay").unwrap(), "complete");
+    assert_eq!((name(&experiment, 0), experiment.row(0).unwrap().value), ("fall", Some(0.0)));
+    let reason = experiment.row(0).unwrap().operators_reason().unwrap();
+    assert_eq!(reason, ("it lay", "changed by the operator, was complete".to_owned()));
+    experiment.change_verdict(0, Verdict::Void, "the mat slid").unwrap();
+    assert_eq!(name(&experiment, 0), "void");
+    let mut experiment = open(folder.path());
+    assert_eq!(name(&experiment, 0), "void");
+    assert_eq!(experiment.change_verdict(0, Verdict::Accept, "it stood").unwrap(), "void");
+    assert_eq!((name(&experiment, 0), experiment.row(0).unwrap().value), ("accept", Some(0.45)));
+    let error = experiment.change_verdict(1, Verdict::Accept, "it stood").unwrap_err().to_string();
+    assert!(error.contains("nothing was measured in trial 1"), "{error}");
+}
+
 /// The change is in the history from which the sampler proposes and in the journal, with the verdict before it.
 #[test]
 fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
@@ -322,7 +355,7 @@ fn a_final_verdict_can_be_changed_and_the_journal_keeps_both() {
     refused(&mut experiment, first, Verdict::Fall, " ", "give the reason");
     refused(&mut experiment, 9, Verdict::Fall, "it lay", "there is no trial 9");
     let before = experiment.proposal().unwrap();
-    assert_eq!(experiment.change_verdict(first, Verdict::Fall, "it lay on its back").unwrap(), Verdict::Accept);
+    assert_eq!(experiment.change_verdict(first, Verdict::Fall, "it lay on its back").unwrap(), "accept");
     let after = experiment.proposal().unwrap();
     assert!(after.revision > before.revision, "the approval of an earlier card would be refused");
     let row = experiment.row(first).unwrap();

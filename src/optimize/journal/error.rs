@@ -14,6 +14,11 @@ pub enum JournalError {
     )]
     Line { path: PathBuf, line: usize, fault: String },
     #[error(
+        "{} is no journal of a study ({fault}); give the study's folder, its `study.log`, or another Optuna journal",
+        path.display()
+    )]
+    NoJournal { path: PathBuf, fault: String },
+    #[error(
         "{path} is an SQLite database, not a journal. If Optuna keeps studies in it, copy them into a journal: python3 -c \
          \"import optuna; from optuna.storages import JournalStorage; from optuna.storages.journal import JournalFileBackend; \
          storage = 'sqlite:///{path}'; to = JournalStorage(JournalFileBackend('study.log')); \

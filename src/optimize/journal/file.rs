@@ -105,6 +105,10 @@ impl JournalFile {
                 Ok(()) => {}
                 // Writers remove an invalid last line; an invalid line before another stops every reader.
                 Err(_) if !bytes[end..].contains(&b'\n') => break,
+                // A journal whose first line is damaged is as rare as a wrong name is frequent, and nothing is to be repaired there.
+                Err(fault) if self.lines == 0 => {
+                    return Err(JournalError::NoJournal { path: self.path.clone(), fault: format!("line 1: {fault}") });
+                }
                 Err(fault) => return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault }),
             }
             self.lines += 1;

@@ -88,6 +88,13 @@ impl Study {
         Ok(())
     }
 
+    /// The value that a trial had when it was accepted last, before its verdict was changed; none where no change has ended that.
+    pub fn formerly_accepted_value(&self, trial: u32) -> Option<f64> {
+        let changes = self.attributes().get(&format!("{CHANGED_VERDICT}{trial}"))?.as_array()?;
+        let accepted = changes.iter().rfind(|change| change["old_verdict"] == "accept")?;
+        accepted.get("old_value")?.as_f64()
+    }
+
     /// Enqueues a trial with the given parameters; the others are suggested when it begins. Returns its number, or
     /// [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an invalid parameter.
     pub fn enqueue(&mut self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<u32, StudyError> {

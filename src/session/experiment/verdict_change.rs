@@ -9,11 +9,16 @@ use crate::optimize::trial::VerdictChange;
 use crate::trial::{CHANGED, JudgedBy, Verdict};
 
 impl Experiment {
-    /// Changes the final verdict of a trial for a reason of the operator; returns the one before. The journal keeps both. The
+    /// Changes the final verdict of a trial for a reason of the operator; returns the name of the one before. The journal keeps both. The
     /// sampler proposes again from the changed history; the operator's changes of the open proposal stay.
     /// Refused during a trial, without a reason, for a trial that was not run, did not jump, has no final verdict or several
     /// rollouts, for the verdict that it has, and for an accepted trial without a value.
-    pub fn change_verdict(&mut self, trial: u32, verdict: Verdict, reason: &str) -> Result<Verdict, RequestRefusal> {
+    pub fn change_verdict(
+        &mut self,
+        trial: u32,
+        verdict: Verdict,
+        reason: &str,
+    ) -> Result<&'static str, RequestRefusal> {
         self.must_be_idle()?;
         let reason = reason.trim();
         let Some(row) = self.rows.get(&trial) else { return not_now(format!("there is no trial {trial}")) };
@@ -36,12 +41,17 @@ impl Experiment {
         if reason.is_empty() {
             return not_now("give the reason of the change");
         }
-        let value = value_of(row, verdict, &self.plan);
+        let value = match verdict {
+            // The value of a trial of another program is not that of a measurement here.
+            Verdict::Accept => value_of(row, verdict, &self.plan).or_else(|| self.study.formerly_accepted_value(trial)),
+            Verdict::Fall | Verdict::Void => value_of(row, verdict, &self.plan),
+        };
         if verdict != Verdict::Void && value.is_none() {
             return not_now(format!("nothing was measured in trial {trial}: it cannot be accepted"));
         }
         // The operator's reason first: a long line is cut. Earlier reasons are in the journal.
-        let cause = format!("{reason}; {CHANGED}, was {}; {}", before.name(), row.cause_by_rule());
+        let name = row.verdict_name().unwrap_or(before.name());
+        let cause = format!("{reason}; {CHANGED}, was {name}; {}", row.cause_by_rule());
         let change = VerdictChange {
             at: Timestamp::now().to_string(),
             verdict: verdict.name().to_owned(),
@@ -61,6 +71,6 @@ impl Experiment {
         if let Some(best) = self.model_best.filter(|_| self.pending_verdict.is_none()) {
             self.study.store_best(best)?;
         }
-        Ok(before)
+        Ok(name)
     }
 }

@@ -207,7 +207,7 @@ fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<Stri
         }
         OperatorRequest::ChangeVerdict { trial, verdict, reason } => {
             let before = experiment.change_verdict(*trial, *verdict, reason)?;
-            format!("it was {}; the journal keeps both", before.name())
+            format!("it was {before}; the journal keeps both")
         }
         OperatorRequest::HandValue(value) => {
             experiment.set_hand_value(*value)?;

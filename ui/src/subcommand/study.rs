@@ -105,9 +105,8 @@ struct StudySelector {
 }
 
 fn parse_setting(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write it as Fx=120")?;
-    let number =
-        value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number; write it as {name}=120"))?;
+    let (name, value) = text.split_once('=').ok_or("write it as NAME=NUMBER, for example Fx=120")?;
+    let number = value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number: {name}=NUMBER"))?;
     Ok((name.trim().to_owned(), number))
 }
 

@@ -11,7 +11,6 @@ use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::report::study::TrialChoice;
 use quadfrog::report::{html, study_page, svg, text};
-use quadfrog::trial::counted;
 
 use super::arguments::VERSION;
 use super::completion;
@@ -63,11 +62,9 @@ pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
         if let TrialChoice::Number(number) = choice
             && !studies.iter().any(|study| study.row(*number).is_some())
         {
-            let most = studies.iter().map(|study| study.rows.len()).max().unwrap_or(0);
-            let message = format!(
-                "--trials {number}: there is no such trial; the studies have at most {}, from 0",
-                counted(most, "trial")
-            );
+            let last = studies.iter().filter_map(|study| study.rows.last()).map(|row| row.trial).max();
+            let last = last.map_or("there is none".to_owned(), |last| format!("the last one is {last}"));
+            let message = format!("--trials {number}: no such trial has begun; {last}");
             return Err(Failure::input(message));
         }
     }
