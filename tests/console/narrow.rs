@@ -306,6 +306,20 @@ fn the_header_of_a_finished_study_names_the_last_trial_that_ran() {
     assert_shows(&console.screen(80, 24), &["trial #3 "]);
 }
 
+/// Regression: the verdict of a trial of another program was cut to `o comple..`.
+#[test]
+fn the_verdict_of_a_trial_of_another_program_is_whole() {
+    let mut console = Console::ready();
+    for number in 0..2 {
+        let row = trial(number, Some(Verdict::Accept), None);
+        console.record(Record::Trial(TrialRecord { source: ProposalSource::OtherProgram, ..row }));
+    }
+    console.press(&["2"]);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        assert_shows(&console.screen(columns, rows), &["* complete", "o complete"]);
+    }
+}
+
 /// Regression: the last sentence of the form was cut, more so once values were changed.
 #[test]
 fn the_form_of_overrides_is_whole_at_60_columns_and_20_rows() {

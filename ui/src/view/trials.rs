@@ -233,7 +233,13 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
                 (None, Some(suggested)) => format!("{}?", suggested.name()),
                 (None, None) => "runs".to_owned(),
             };
-            (format!("{symbol} {verdict:<7}{}", if best { "*" } else { " " }), role)
+            let text = match (verdict.len() > 7, best) {
+                (false, true) => format!("{symbol} {verdict:<7}*"),
+                // The column has no room behind it.
+                (true, true) => format!("* {verdict}"),
+                (_, false) => format!("{symbol} {verdict}"),
+            };
+            (text, role)
         }
         Column::JudgedBy => (trial.judged_by.map_or("", JudgedBy::name).to_owned(), Role::Quiet),
         Column::Source => (trial.origin(), Role::Quiet),
