@@ -14,6 +14,8 @@ pub const PARAMETER: &str = "params_";
 pub const ATTRIBUTE: &str = "user_attrs_";
 /// Beginning of the column of a system attribute.
 pub const SYSTEM_ATTRIBUTE: &str = "system_attrs_";
+/// Column of the notes.
+const NOTE: &str = "note";
 
 /// Error in a table of trials.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -23,7 +25,8 @@ pub enum ExchangeError {
     #[error("not {format}: {message}")]
     Format { format: &'static str, message: String },
     #[error(
-        "there is no {0}; give one parameter per column `params_<name>` (JSON: an object `params`), `value` and `state`"
+        "there is no {0}; give one parameter per column `params_<name>` (JSON: an object `params`), `value` and `state`, as \
+         `quadfrog study export` does"
     )]
     Missing(&'static str),
     /// Rows are counted from 1.
@@ -41,6 +44,8 @@ pub struct TableTrial {
     pub attributes: Map<String, Value>,
     pub started: Option<Timestamp>,
     pub completed: Option<Timestamp>,
+    /// Empty without one.
+    pub note: String,
 }
 
 /// Reads a CSV table.
@@ -55,7 +60,9 @@ pub fn from_csv(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(format)?;
         let cells = header.iter().zip(&record).filter(|(_, cell)| !cell.is_empty());
-        let members = cells.map(|(column, cell)| (column.to_owned(), plain(cell))).collect();
+        // A note is text, also where it looks like a number.
+        let value = |column, cell: &str| if column == NOTE { Value::String(cell.to_owned()) } else { plain(cell) };
+        let members = cells.map(|(column, cell)| (column.to_owned(), value(column, cell))).collect();
         trials.push(trial(row + 1, &nested(members))?);
     }
     Ok(trials)
@@ -159,5 +166,6 @@ fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, Exchang
         attributes: members.get("user_attrs").and_then(Value::as_object).cloned().unwrap_or_default(),
         started: time("datetime_start")?,
         completed: time("datetime_complete")?,
+        note: members.get(NOTE).and_then(Value::as_str).unwrap_or_default().to_owned(),
     })
 }

@@ -58,6 +58,10 @@ fn a_recording_of_a_running_session_is_not_called_damaged() {
     let (mut session, study) = console(&program);
     let part = study.join("session.mcap.part");
     assert_shows(&program.text(&["replay", "--check", part.to_str().unwrap()]), &["a session still writes it"]);
+    // Regression: a report said that the program had not finished the file.
+    let report = program.text(&["report", part.parent().unwrap().to_str().unwrap()]);
+    let words = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("a session still writes it") && !words.contains("did not finish"), "{report}");
     // Regression: its export failed, with the advice to recover the folder.
     let export = program.run(&["export", study.to_str().unwrap(), "-o", "signals.csv"]);
     let message = String::from_utf8_lossy(&export.stderr);

@@ -233,6 +233,26 @@ fn a_table_that_is_imported_twice_is_no_repeat() {
     assert!(printed.starts_with("0 trials") && printed.contains("2 were there already"), "{printed}");
 }
 
+/// Regression: notes were lost without a word.
+#[test]
+fn notes_are_imported_with_their_trials() {
+    let (program, study) = study("forward");
+    program.text(&["study", "export", &study, "--output", "own.csv"]);
+    let rows = "params_f0,params_Fx,params_Fz,value,note\n1.0,100,250,0.5,\"slipped, \"\"far\"\"\"\n1.1,100,250,0.4,\n1.2,100,250,0.3,0070\n";
+    program.write("noted.csv", rows);
+    assert!(program.text(&["study", "import", &study, "noted.csv"]).starts_with("3 trials imported"));
+    let shown = program.text(&["study", "show", &study]);
+    assert_shows(&shown, &["Note on trial 6: slipped, \"far\"", "Note on trial 8: 0070"]);
+    assert_eq!(shown.matches("Note on trial").count(), 2, "{shown}");
+    // As JSON, into another study.
+    program.text(&["study", "export", &study, "--output", "own.json"]);
+    program.text(&["optimize", "--trials", "1", "--seed", "9", "--output", "other", "--record", "none"]);
+    let other = program.study("other").display().to_string();
+    program.text(&["study", "import", &other, "own.json"]);
+    let shown = program.text(&["study", "show", &other]);
+    assert_eq!(shown.matches("Note on trial").count(), 2, "{shown}");
+}
+
 /// Regression: the help of import offered Parquet, which it refuses.
 #[test]
 fn import_offers_the_formats_that_it_reads() {

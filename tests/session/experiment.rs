@@ -317,6 +317,7 @@ fn a_trial_of_another_program_has_its_value_again_when_it_is_accepted_again() {
         attributes: serde_json::Map::new(),
         started: None,
         completed: None,
+        note: String::new(),
     };
     let trials = vec![table(Some(0.45), TrialState::Complete), table(None, TrialState::Fail)];
     import(&mut study_in(folder.path()), trials).unwrap();
@@ -753,6 +754,7 @@ fn a_trial_under_review_need_not_be_the_newest() {
         attributes: serde_json::Map::new(),
         started: None,
         completed: None,
+        note: String::new(),
     };
     let newer = import(&mut study_in(folder.path()), vec![done]).unwrap();
     experiment.refresh().unwrap();

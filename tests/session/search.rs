@@ -588,6 +588,50 @@ fn a_changed_proposal_has_the_number_of_its_trial_though_another_program_queues_
     assert_ne!(queued.seed, spec.seed, "no two trials have the same noise");
 }
 
+/// Regression: a point that was queued in the second before an approval took the number of the approved trial.
+#[test]
+fn an_approval_sees_a_point_that_another_program_has_just_queued() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let seen = experiment.proposal().unwrap();
+    study_in(folder.path()).enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    let error = experiment.approve(seen.trial, seen.revision).unwrap_err();
+    assert!(matches!(error, RequestRefusal::Overtaken(0)), "{error}");
+    assert_eq!((experiment.proposal().unwrap().source, value(&experiment, "Fx")), (ProposalSource::Queued, 77.0));
+    // One that the operator has changed runs, under the number that it has now.
+    let mut experiment = open(folder.path());
+    accept(&mut experiment);
+    experiment.set_parameter("Fz", 200.0).unwrap();
+    let seen = experiment.proposal().unwrap();
+    study_in(folder.path()).enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
+    let spec = experiment.approve(seen.trial, seen.revision).unwrap();
+    assert_eq!((seen.trial, spec.trial, spec.jump.fz_n), (1, 2, 200.0));
+}
+
+/// Regression: the queue held the trial that ran, and not what was queued meanwhile.
+#[test]
+fn the_queue_is_that_of_the_study_during_a_trial_and_its_review() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let queue = |experiment: &mut Experiment| {
+        experiment.refresh().unwrap();
+        let mut news = News::default();
+        told(experiment, &mut news);
+        news.search.map(|search| search.queue.iter().map(|point| point.trial).collect::<Vec<_>>())
+    };
+    study_in(folder.path()).enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    assert_eq!(queue(&mut experiment), Some(vec![0]));
+    let spec = approve(&mut experiment);
+    assert_eq!(queue(&mut experiment), Some(vec![]));
+    study_in(folder.path()).enqueue(&[("Fx".into(), 78.0)], &[]).unwrap();
+    assert_eq!(queue(&mut experiment), Some(vec![1]));
+    experiment.ended(spec.trial, &TrialEnd::Settled, &[], 0);
+    study_in(folder.path()).enqueue(&[("Fx".into(), 79.0)], &[]).unwrap();
+    assert_eq!(queue(&mut experiment), Some(vec![1, 2]));
+    assert_eq!(queue(&mut experiment), None, "published once");
+    assert_eq!(experiment.under_review().map(|row| row.trial), Some(0));
+}
+
 /// A study in which this trial is to be run again, and another program has queued a point with Fx = 77 at the same moment.
 fn rerun_beside_a_queued_point(folder: &Path) -> (Experiment, TrialSpec) {
     let mut experiment = open(folder);

@@ -51,7 +51,15 @@ impl Study {
             let new = creations.iter().filter(|(row, _)| is_new(row)).map(|(_, create)| create.clone());
             Ok::<_, JournalError>(new.collect())
         })?;
-        Ok(self.created(&applied).collect())
+        let created: Vec<u32> = self.created(&applied).collect();
+        let mut noted: Vec<&TableTrial> = trials.iter().filter(|row| !row.note.is_empty()).collect();
+        for number in &created {
+            let trial = self.trial(*number)?;
+            if let Some(place) = noted.iter().position(|row| is_same(row, trial)) {
+                self.note(*number, &noted.swap_remove(place).note)?;
+            }
+        }
+        Ok(created)
     }
 
     /// Checks that the parameters of a point exist and lie within the present bounds.

@@ -249,6 +249,7 @@ impl Experiment {
         if matches!(self.state, ExperimentState::BetweenRepeats(_)) {
             return self.approve_repeat(trial, revision);
         }
+        self.see_the_queue(trial, revision)?;
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to approve") };
         open.must_be(trial, revision)?;
         if let Some(refusal) = self.refusal() {
@@ -267,6 +268,7 @@ impl Experiment {
             between.must_be(trial, revision)?;
             return self.give_up(trial);
         }
+        self.see_the_queue(trial, revision)?;
         let ExperimentState::Proposed(open) = &self.state else { return not_now("there is no proposal to skip") };
         open.must_be(trial, revision)?;
         let cause = match self.refusal() {
@@ -279,13 +281,33 @@ impl Experiment {
         Ok(())
     }
 
+    /// Sees what other programs have changed a moment ago before a proposal of the sampler becomes a trial: a queued point comes
+    /// first, or takes the number of a proposal that the operator has changed; the last trial may have been run. A queued proposal
+    /// has its number already.
+    fn see_the_queue(&mut self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
+        let is_open = |experiment: &Experiment| match &experiment.state {
+            ExperimentState::Proposed(open) => !open.is_queued() && open.must_be(trial, revision).is_ok(),
+            _ => false,
+        };
+        if is_open(self) {
+            self.refresh()?;
+            if !is_open(self) {
+                return Err(RequestRefusal::Overtaken(trial));
+            }
+        }
+        Ok(())
+    }
+
     /// Records the changes of other programs: their trials join the table, and a point that they have queued is proposed
-    /// next if the operator has not changed the proposal. To be called regularly.
+    /// next if the operator has not changed the proposal. During a trial only the queue is published. To be called regularly.
     pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
-        if !self.is_idle() {
+        if matches!(self.state, ExperimentState::AwaitsPrior) {
             return Ok(());
         }
         self.study.refresh()?;
+        if !self.is_idle() {
+            return Ok(self.publish_changes()?);
+        }
         let log = self.queue.close_abandoned(&mut self.study)?;
         self.log_all(log);
         self.take_rows();

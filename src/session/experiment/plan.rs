@@ -13,8 +13,8 @@ pub enum RequestRefusal {
     /// The request does not fit the present stage or the bounds.
     #[error("{0}")]
     NotNow(String),
-    /// Another worker began the proposed trial; there is a new proposal.
-    #[error("another worker was faster: the proposal for trial {0} does not hold any more; approve the new one")]
+    /// Another program has begun the proposed trial, or queued a point before it; there is a new proposal.
+    #[error("another program was faster: the proposal for trial {0} does not hold any more; approve the new one")]
     Overtaken(u32),
     /// Another program ended the trial under review; there is a new proposal.
     #[error("trial {0} was ended by another program: that result stands")]

@@ -62,7 +62,7 @@ enum StudySubcommand {
         #[arg(long, short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Add the trials of a table, written by this program or Optuna's trials_dataframe, as finished trials
+    /// Add the trials of a table, written by `study export` or Optuna's trials_dataframe, as finished trials
     Import {
         #[command(flatten)]
         study: StudySelector,

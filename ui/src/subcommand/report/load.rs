@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use quadfrog::config::Config;
 use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::study::Storage;
+use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
 use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
@@ -16,6 +17,7 @@ use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
 use crate::subcommand::failure::Failure;
+use crate::subcommand::replay::{is_written, lacks_its_end_alone};
 use crate::subcommand::selection::parse_storage;
 
 /// Returns the studies of a place: of a study's folder, of the studies in a folder, of a journal's file or of a server.
@@ -80,7 +82,7 @@ fn reported(
     let configured = control.map(|control| control.gains().values()).unwrap_or_default();
     let best = opened.best(&rows);
     let recordings = match &robot {
-        Some(robot) => Recordings::read(&recordings(opened, folder), robot),
+        Some(robot) => read(&recordings(opened, folder), robot),
         None => Recordings::default(),
     };
     let backend = study.attributes().get("backend").and_then(Value::as_str).and_then(|name| name.parse().ok());
@@ -111,6 +113,19 @@ fn reported(
         changed: kept.map_or_else(Vec::new, |_| configuration::differences(&defaults.as_run, &config.as_run)),
         configuration: kept.map_or_else(Vec::new, |_| config.as_run.clone()),
     })
+}
+
+/// Reads recordings; what a session still writes is not damaged by having no end.
+fn read(files: &[PathBuf], robot: &RobotDescription) -> Recordings {
+    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
+    let mut recordings = Recordings::read(files, robot);
+    for player in written.into_iter().filter_map(|file| Player::open(file).ok()).filter(lacks_its_end_alone) {
+        let no_end = player.damage();
+        for damage in recordings.damages.iter_mut().filter(|damage| no_end.as_ref() == Some(*damage)) {
+            *damage = format!("{}: a session still writes it", player.path().display());
+        }
+    }
+    recordings
 }
 
 /// Returns the robot of a kept configuration, else the built-in one of that name.
