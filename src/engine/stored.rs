@@ -7,13 +7,12 @@ use super::folder::{STUDY_FILE, study_files};
 use crate::config::Config;
 use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
-use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial};
-use crate::session::experiment::rows_of;
+use crate::session::experiment::{best_of, rows_of};
 use crate::session::experiment::study_attributes::StudyAttributes;
-use crate::trial::{ParameterInfo, Task, TrialRecord, Verdict};
+use crate::trial::{ParameterInfo, Task, TrialRecord};
 
 /// Description of a stored study of this program.
 #[expect(missing_docs, reason = "the types say the rest")]
@@ -68,19 +67,9 @@ impl Opened {
         rows_of(&self.study, &self.parameters)
     }
 
-    /// Returns the row of the best trial, as a session shows it: by the sampler's model if that was stored after the newest trial,
-    /// else the accepted trial whose point has the greatest value, the earliest of equals. A verdict that its session can still take
-    /// back counts.
+    /// Returns the row of the best trial, as a session shows it ([`best_of`]).
     pub fn best<'a>(&self, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
-        if let Some(best) = self.study.model_best() {
-            return rows.iter().find(|row| row.trial == best.trial);
-        }
-        let points = points(self.study.trials());
-        let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
-        let feasible = |row: &&TrialRecord| self.study.trial(row.trial).is_ok_and(|trial| trial.violation() <= 0.0);
-        let accepted = rows.iter().filter(|row| row.verdict == Some(Verdict::Accept)).filter(feasible);
-        let candidates = accepted.filter_map(|row| Some((row, row.trial, row.value?)));
-        improvements(candidates, mean, self.study.options().direction).last()
+        best_of(&self.study, rows.iter(), self.study.model_best())
     }
 }
 

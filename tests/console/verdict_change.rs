@@ -19,15 +19,21 @@ fn study_in(folder: &Path) -> PathBuf {
     below.find(|path| path.join("study.log").exists()).expect("a study")
 }
 
-#[test]
-fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
+/// A session in `folder` whose trial 0 waits for its verdict.
+fn jumped(folder: &Path) -> Session {
+    let mut session = Session::start(folder, (120, 40), &["--seed", "3"]);
     session.wait_for(&["Press A to arm"]);
     session.send("A");
     session.wait_for(&["Press g twice"]);
     session.approve();
     session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    session
+}
+
+#[test]
+fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut session = jumped(folder.path());
     session.send("a");
     session.wait_for(&["Trial #1"]);
     session.send("2");
@@ -84,12 +90,7 @@ fn a_changed_verdict_is_in_the_table_the_journal_and_the_exports() {
 #[test]
 fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
-    session.wait_for(&["Press A to arm"]);
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    let mut session = jumped(folder.path());
     session.send("=");
     session.wait_for(&["displacement forward, start to rest; the robot measured"]);
     session.send("0.4\r");
@@ -132,12 +133,7 @@ fn a_trial_that_waits_for_its_verdict_waits_until_the_study_is_continued() {
 #[test]
 fn readers_of_a_study_see_its_best_trial_at_once_and_that_its_session_was_killed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut session = Session::start(folder.path(), (120, 40), &["--seed", "3"]);
-    session.wait_for(&["Press A to arm"]);
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.approve();
-    session.wait_for(&["Trial #0: judge it", "TRIAL #0"]);
+    let mut session = jumped(folder.path());
     session.send("r");
     session.wait_for(&["Trial #1 (", "Press g twice"]);
     session.approve();

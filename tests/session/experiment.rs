@@ -281,6 +281,29 @@ fn a_reader_of_the_study_has_the_same_best_as_the_session_after_every_verdict() 
     assert_eq!(judged(&mut experiment, Verdict::Accept, false, 0.5), Some(3));
 }
 
+/// Regression: the best of a session could be a trial that another program had marked as infeasible, which no reader showed as such.
+#[test]
+fn a_trial_that_violates_a_constraint_is_the_best_neither_of_the_session_nor_for_a_reader() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let journal = folder.path().join(STUDY_FILE);
+    let mut experiment = open(folder.path());
+    for (value, constraint) in [(0.4, -1.0), (0.6, 1.0)] {
+        let spec = run(&mut experiment, TrialEnd::Settled);
+        let mut file = std::fs::OpenOptions::new().append(true).open(&journal).unwrap();
+        let trial = spec.trial;
+        let attribute = serde_json::json!({"constraints": [constraint]});
+        let line = serde_json::json!({"op_code": 9, "worker_id": "other", "trial_id": trial, "system_attr": attribute});
+        writeln!(file, "{line}").unwrap();
+        experiment.set_hand_value(Some(value)).unwrap();
+        experiment.judge(Verdict::Accept, false).unwrap();
+    }
+    let opened = open_stored(&Storage::File(journal), None, &Config::load(None).unwrap()).unwrap();
+    assert_eq!(opened.study.trial(1).unwrap().violation(), 1.0);
+    assert_eq!(opened.best(&opened.rows()).map(|best| best.trial), Some(0));
+    assert_eq!(experiment.best().map(|best| best.trial), Some(0));
+}
+
 #[test]
 fn a_trial_in_which_nothing_was_measured_cannot_be_accepted_without_a_hand_measured_value() {
     let mut experiment = experiment(5);

@@ -6,6 +6,7 @@
 //! and is therefore what the study itself will propose.
 
 pub(crate) mod attributes;
+mod best;
 mod between_repeats;
 mod changes;
 mod confirmation;
@@ -24,6 +25,7 @@ pub(crate) mod study_attributes;
 mod trial_changes;
 mod verdict_change;
 
+pub use self::best::best_of;
 pub use self::changes::CHANGED_PREFIX;
 pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
@@ -40,11 +42,9 @@ use self::open_proposal::OpenProposal;
 use self::plan::not_now;
 use self::queue::TrialQueue;
 use self::search::SearchSettings;
-use crate::optimize::ask::Direction;
 use crate::optimize::exchange::TableTrial;
 use crate::optimize::journal::JournalWait;
 use crate::optimize::prior::PriorModel;
-use crate::optimize::repeats::{RepeatedPoint, improvements, points};
 use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::recording::record::{LogLevel, LogRecord, Record, StageRecord};
@@ -197,16 +197,9 @@ impl Experiment {
         self.model_best
     }
 
-    /// Returns the best trial by the sampler's model; without a model the accepted trial whose point has the greatest value,
-    /// the earliest of equals. The value of a repeated point is the mean of its repeats ([`crate::optimize::repeats`]).
+    /// Returns the best trial ([`best_of`]).
     pub fn best(&self) -> Option<&TrialRecord> {
-        if let Some(best) = self.model_best.and_then(|best| self.row(best.trial)) {
-            return Some(best);
-        }
-        let points = points(self.study.trials());
-        let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
-        let accepted = self.rows.values().filter(|row| row.verdict == Some(Verdict::Accept));
-        improvements(accepted.filter_map(|row| Some((row, row.trial, row.value?))), mean, Direction::Maximize).last()
+        best_of(&self.study, self.rows.values(), self.model_best)
     }
 
     /// Returns the proposal that waits for approval.
