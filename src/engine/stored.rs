@@ -10,8 +10,8 @@ use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial};
-use crate::session::experiment::{best_of, rows_of};
 use crate::session::experiment::study_attributes::StudyAttributes;
+use crate::session::experiment::{best_of, rows_of};
 use crate::trial::{ParameterInfo, Task, TrialRecord};
 
 /// Description of a stored study of this program.

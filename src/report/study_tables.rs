@@ -90,7 +90,7 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
     let columns = [Column::text("task"), Column::number("studies", "")].into_iter();
     let columns = columns.chain(at.iter().map(|count| Column::number(in_words(*count, "trial"), "")));
     let caption = format!(
-        "Best value so far, mean and standard deviation over the studies, in the unit of J.{}",
+        "Best value of a single trial so far: mean and standard deviation over the studies, in the unit of J.{}",
         explained(groups.iter().flatten().flat_map(|study| study.best_so_far_rows()).flatten())
     );
     let mut table = Table::new(caption, columns);

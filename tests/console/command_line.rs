@@ -293,6 +293,7 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         (&["prior", "--jobs", "1.5"], "for '--jobs <N>': give a whole number from 1 to 65535"),
         (&["study", "list"], "recordings: there is no such folder; give a folder that holds studies"),
         (&["--observe", "--resume", "recordings"], "'--observe' cannot be used with '--resume <DIR>'"),
+        (&["--observe", "--approve", "auto"], "'--observe' cannot be used with '--approve <WHAT>'"),
         (&["replay", "notes.txt"], "give one, or the folder of its study"),
         (
             &["optimize", "--trials", "1", "--output", "notes.txt/below"],

@@ -357,8 +357,8 @@ fn no_key_acts_on_a_row_that_the_filter_leaves_out() {
     console.press(&["v"]);
     assert_shows(&console.screen(80, 24), &["Trial #0: fall becomes void. Why?"]);
     console.press(&["Esc", "/", "2", "Enter"]);
-    assert_shows(&console.screen(80, 24), &["the table leaves trial 2 out; F and b show others"]);
-    console.press(&["Esc", "F", "F", "b"]);
+    assert_shows(&console.screen(120, 40), &["the table shows all trials: it had left trial 2 out", ">  2"]);
+    console.press(&["b"]);
     assert_shows(&console.screen(120, 40), &["best only (b)"]);
 }
 

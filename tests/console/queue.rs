@@ -19,7 +19,6 @@ fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A session with an armed robot and three queued points, and the folder of its study.
 /// Arms the robot and lets it jump; the trial waits for its verdict then.
 fn jump(session: &mut Session) {
     session.send("A");
@@ -34,6 +33,7 @@ fn study_of(folder: &Path) -> PathBuf {
     entries.find(|path| path.join("study.log").exists()).expect("a study")
 }
 
+/// A session with three queued points, and the folder of its study.
 fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
     let mut session = Session::start(folder, (120, 40), &["--seed", "3", "--sampler", "random"]);
     session.wait_for(&["Press A to arm"]);
@@ -55,6 +55,45 @@ fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
         "#2    queued          f0 1.3",
     ]);
     (session, study)
+}
+
+/// Regression: the queue view of a finished study did not show what another program had queued since, nor say when it runs; and that
+/// program said nothing of it while the last verdict could be taken back. An exported table's queued points were counted as trials.
+#[test]
+fn a_point_that_is_queued_for_a_finished_study_is_shown_and_waits_for_more_trials() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--seed", "3", "--sampler", "random", "--trials", "1"];
+    let mut session = Session::start(folder.path(), (120, 40), &arguments);
+    session.wait_for(&["Press A to arm"]);
+    jump(&mut session);
+    session.send("a");
+    session.wait_for(&["The study is finished."]);
+    session.send("N");
+    session.wait_for(&["Nothing is queued: the study is finished, and C gives it more trials.", "in Trials queues"]);
+    let study = study_of(folder.path());
+    let study = study.to_str().unwrap();
+    let queued = text(&quadfrog(folder.path(), &["study", "enqueue", study, "f0=1.1", "Fx=60", "Fz=240"]));
+    let expected = "Queued as trial 1; the study has all of its trials: it runs once `C` in the console gives more";
+    assert_eq!(queued.split_whitespace().collect::<Vec<_>>().join(" "), expected);
+    session
+        .wait_for(&["The study is finished: these run once C gives it more trials.", "#1    queued          f0 1.100"]);
+    let exported = quadfrog(folder.path(), &["study", "export", study, "-o", "table.csv"]);
+    let said = String::from_utf8_lossy(&exported.stderr).into_owned();
+    assert!(said.contains("1 trial and 1 queued point: table.csv"), "{said}");
+    // Regression: the advice to queue the unfinished ones queued all of them.
+    let imported = text(&quadfrog(folder.path(), &["study", "import", study, "table.csv"]));
+    assert!(imported.contains("2 unfinished trials ignored, --queue=waiting queues 1"), "{imported}");
+    let again = text(&quadfrog(folder.path(), &["study", "import", "--queue=waiting", study, "table.csv"]));
+    assert!(again.contains("1 point queued"), "{again}");
+    let table = std::fs::read_to_string(folder.path().join("table.csv")).unwrap();
+    std::fs::write(folder.path().join("far.csv"), table.replace("240", "900")).unwrap();
+    let refused = quadfrog(folder.path(), &["study", "import", "--queue", study, "far.csv"]);
+    let said = String::from_utf8_lossy(&refused.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+    let expected = "far.csv: row 2: Fz = 900 is outside its bounds 150 to 350; widen them with `B` in the console, or \
+                    leave the row out";
+    assert!(said.contains(expected), "{said}");
+    session.wait_for(&["#2    queued          f0 1.100"]);
+    assert!(session.screen().contains("#1") && !session.screen().contains("#3"), "{}", session.screen());
 }
 
 /// Regression: the approval, the header and the log named the number that the queued point had, and the jump had another one.

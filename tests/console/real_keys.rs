@@ -99,7 +99,7 @@ const REPLAY: &[Row] = &[
     row(Action::Faster, ">", Hides("x0.5"), ("", "")),
     row(Action::Freeze, "z", Shows("VIEW FROZEN"), ("", "")),
     row(Action::Left, "Left", Shows("cursor -0.08 s"), ("", "")),
-    row(Action::Right, "Right", Shows("cursor -0.00 s"), ("z", "8 s sweep")),
+    row(Action::Right, "Right", Shows("cursor 0.00 s"), ("z", "8 s sweep")),
     row(Action::ZoomIn, "+", Shows("4 s sweep"), ("", "")),
     row(Action::ZoomOut, "-", Shows("8 s sweep"), ("", "")),
     row(Action::ChartMode, "w", Shows("8 s scroll"), ("w", "8 s sweep")),

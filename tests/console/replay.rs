@@ -10,7 +10,7 @@ use crate::program::{Program, assert_shows};
 use crate::pty::Session;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
-use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::player::{MarkerKind, Played, Player};
 use quadfrog::recording::record::SessionInfo;
 use quadfrog::recording::session_files::recordings_in;
 use quadfrog::recording::timeline::{Timeline, TrialRun};
@@ -221,6 +221,35 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
     session.wait_for(&[&fallen(*falls().last().unwrap())]);
     session.send("([");
     session.wait_for(&["no earlier trial or fault", "00:00.000"]);
+}
+
+/// Regression: a fault that ended a trial as a fall was two places, 10 ms apart: the key seemed to do nothing.
+#[test]
+fn a_fault_that_ends_a_trial_is_one_place() {
+    let program = Program::new();
+    program.write("mine/safety.toml", "[watchdog]\nvelocity_factor = 1.1\n");
+    let arguments = ["optimize", "--config", "mine", "--trials", "6", "--seed", "0", "--record", "all"];
+    program.text(&arguments);
+    let file = program.study("recordings").join("session.mcap");
+    let timeline = Timeline::open(std::slice::from_ref(&file)).unwrap();
+    let rows = timeline.rows();
+    let faults: Vec<u64> =
+        timeline.markers().iter().filter(|m| m.kind == MarkerKind::Fault).map(|m| m.time_ns).collect();
+    let place = |run: &TrialRun| {
+        let fault = faults.iter().find(|fault| (run.begin_ns..=run.end_ns).contains(fault));
+        (fault.copied().unwrap_or(run.end_ns - 1_000_000), fault.is_some())
+    };
+    let fell = |run: &&TrialRun| rows[&run.trial].verdict == Some(Verdict::Fall);
+    let places: Vec<(u64, bool)> = timeline.trials().iter().filter(fell).map(place).collect();
+    let of_faults = places.iter().filter(|(_, by_fault)| *by_fault).count();
+    assert!(1 < of_faults && of_faults == faults.len() && of_faults < places.len(), "{places:?}, {rows:?}");
+    let mut session = paused(&file);
+    for (time_ns, _) in places {
+        session.send("}");
+        session.wait_for(&[&shown(time_ns)]);
+    }
+    session.send("}");
+    session.wait_for(&["no further fall or fault"]);
 }
 
 /// Regression: a replay that was stopped for a while had played on meanwhile.

@@ -137,7 +137,10 @@ fn text_fits_a_terminal_and_has_the_tables_of_the_page() {
     for line in text.lines().filter(place_lines) {
         assert!(line.chars().count() <= 80, "{line}");
     }
-    assert_shows(&text, &["J_forward = x_final - x_init", "Studies.", "(deg)", "(N m)", "(W)", "Best value so far"]);
+    assert_shows(
+        &text,
+        &["J_forward = x_final - x_init", "Studies.", "(deg)", "(N m)", "(W)", "Best value of a single trial so far"],
+    );
     let best = exported(&program, &study).iter().filter_map(|trial| trial["value"].as_f64()).fold(0.0, f64::max);
     assert!(text.contains(&format!("{best:.3}")), "{text}");
 }
@@ -205,7 +208,7 @@ fn several_studies_are_grouped_by_task_with_mean_and_deviation() {
         })
         .collect();
     let (mean, deviation) = ((best[0] + best[1]) / 2.0, (best[0] - best[1]).abs() / 2f64.sqrt());
-    let row = &table(&page, "Best value so far")["rows"][0];
+    let row = &table(&page, "Best value of a single trial so far")["rows"][0];
     assert_eq!(row.as_array().unwrap().last().unwrap(), &format!("{mean:.3} +- {deviation:.3}"));
     let names: Vec<&str> = blocks(&page, "figure").iter().map(|figure| figure["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"forward-convergence") && names.contains(&"twist-ccw-motion"), "{names:?}");

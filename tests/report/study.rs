@@ -140,10 +140,10 @@ fn best_so_far_counts_accepted_trials_alone() {
 fn the_best_so_far_is_left_out_before_the_first_counted_trial() {
     let shown = |rows| text::render(&study_page::summary(&study(0, rows)), 80);
     let none = shown(vec![row(0, Verdict::Void, 0.0)]);
-    assert!(!none.contains("0 trials") && !none.contains("Best value so far"), "{none}");
+    assert!(!none.contains("0 trials") && !none.contains("Best value of a single trial so far"), "{none}");
     assert!(none.contains("Studies. 1 trial, 0 counted") && none.contains("No trial of forward"), "{none}");
     let one = shown(vec![row(0, Verdict::Accept, 0.5)]);
-    assert!(one.contains("Best value so far") && !one.contains("trials\n"), "{one}");
+    assert!(one.contains("Best value of a single trial so far") && !one.contains("trials\n"), "{one}");
 }
 
 /// Regression: no page said how many trials ran with changed values or were re-runs.
@@ -171,7 +171,8 @@ fn the_table_of_studies_fits_80_columns_and_counts_repeats_apart() {
     for studies in [&studies[..1], &studies] {
         let page = study_page::page(studies, &[], "0.1.0 (test)");
         let shown = text::render(&page, 80);
-        let results = &shown[shown.find("Studies.").unwrap()..shown.find("Best value so far").unwrap()];
+        let results =
+            &shown[shown.find("Studies.").unwrap()..shown.find("Best value of a single trial so far").unwrap()];
         assert_eq!(results.matches("accepted").count(), 1, "{results}");
         assert!(results.lines().all(|line| line.chars().count() <= 80), "{results}");
         let row = results.lines().find(|line| line.starts_with("forward, seed 0")).unwrap();

@@ -667,6 +667,52 @@ fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
 }
 
+/// Regression: the point came before the re-run, which had been queued earlier.
+#[test]
+fn a_rerun_keeps_its_place_before_a_point_that_is_queued_after_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut other = study_in(folder.path());
+    let mut experiment = open(folder.path());
+    let spec = approve(&mut experiment);
+    other.enqueue(&[("Fx".into(), 75.0)], &[]).unwrap();
+    experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 0.4), 0);
+    experiment.judge(Verdict::Void, true).unwrap();
+    // What waited already comes first.
+    assert_eq!(accept(&mut experiment).jump.fx_n, 75.0);
+    let again = run(&mut experiment, TrialEnd::Settled);
+    assert_eq!((again.trial, again.jump), (2, spec.jump));
+    experiment.judge(Verdict::Void, true).unwrap();
+    let seen = experiment.proposal().unwrap();
+    assert_eq!((seen.trial, seen.parent), (3, Some(2)));
+    for fx in [77.0, 78.0] {
+        study_in(folder.path()).enqueue(&[("Fx".into(), fx)], &[]).unwrap();
+        experiment.take_records();
+        experiment.refresh().unwrap();
+    }
+    let queue = |records: Vec<Record>| {
+        let search = records.into_iter().rev().find_map(|record| match record {
+            Record::Search(search) => Some(search.queue),
+            _ => None,
+        });
+        search.unwrap().into_iter().map(|point| (point.trial, point.parameters.get("Fx"))).collect::<Vec<_>>()
+    };
+    let expected = vec![(3, Some(spec.jump.fx_n)), (4, Some(77.0)), (5, Some(78.0))];
+    assert_eq!(queue(experiment.take_records()), expected);
+    experiment.refresh().unwrap();
+    assert_eq!(experiment.take_records(), [], "said once");
+    assert_eq!(experiment.proposal(), Some(seen.clone()), "an open question stays");
+    let again = experiment.approve(seen.trial, seen.revision).unwrap();
+    assert_eq!((again.trial, again.jump), (3, spec.jump));
+    experiment.ended(again.trial, &TrialEnd::Settled, &ticks(again.trial, 0.4), 0);
+    // Taken back, the re-run of this verdict leaves the queue as it is.
+    experiment.judge(Verdict::Void, true).unwrap();
+    experiment.undo().unwrap();
+    experiment.judge(Verdict::Accept, false).unwrap();
+    let queued = [accept(&mut experiment), accept(&mut experiment)];
+    assert_eq!(queued.map(|spec| (spec.trial, spec.jump.fx_n)), [(4, 77.0), (5, 78.0)]);
+    assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
+}
+
 /// (A danger once: it ran, with whatever it said.)
 #[test]
 fn a_point_of_another_program_beyond_the_limits_cannot_run() {

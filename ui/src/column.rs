@@ -39,7 +39,7 @@ impl Column {
             Column::Air => "longest time in the air, s",
             Column::Value => "the objective that the sampler receives",
             Column::Verdict => "the verdict, or the suggested one",
-            Column::JudgedBy => "operator, or a rule of the program; where the cause has room beside it",
+            Column::JudgedBy => "operator or rule; on a screen with room for the cause, too",
             Column::Source => "source of the parameters",
             Column::Risk => "falls among the nearest trials before it ran",
             Column::Time => "when it ran, since the session began",

@@ -143,6 +143,7 @@ impl Experiment {
             Ok(()) => {}
         }
         self.publish_row(trial);
+        let rerun = rerun.then_some(self.study.trials().len() as u32);
         self.pending_verdict = Some(PendingVerdict { suggestion, outcome, rerun });
         self.propose()?;
         Ok(())

@@ -59,8 +59,8 @@ struct PendingVerdict {
     /// The row before the verdict.
     suggestion: TrialRecord,
     outcome: Outcome,
-    /// Queue the same parameters again.
-    rerun: bool,
+    /// Queue the same parameters again, before every trial from this number on: those were queued after the verdict.
+    rerun: Option<u32>,
 }
 
 /// State of the current trial.
@@ -306,7 +306,7 @@ impl Experiment {
         self.take_rows();
         match &self.state {
             ExperimentState::Proposed(open) => {
-                let next = self.study.waiting().next().map(|trial| trial.number);
+                let next = self.next_in_study();
                 let full = |study: &Study| self.queue.occupied(study.trials()) >= self.plan.budget;
                 // The journal does not have the last verdict yet.
                 if full(&self.study) && !open.approved().is_beyond_budget() && full(&self.study_with_verdict()?) {
@@ -329,6 +329,7 @@ impl Experiment {
                 if room || queued || confirms {
                     self.propose()?;
                 }
+                self.publish_changes()?;
             }
         }
         Ok(())
@@ -337,7 +338,7 @@ impl Experiment {
     /// Gives the open proposal the number that its trial will have: another program has added trials. Its values and its revision
     /// stay, and with them a question that is open.
     fn renumber(&mut self) -> Result<(), StudyError> {
-        let next = self.study.trials().len() as u32;
+        let next = self.first_after_rerun().unwrap_or(self.study.trials().len() as u32);
         let ExperimentState::Proposed(open) = &self.state else { return Ok(()) };
         if open.waits_as().is_some() || open.number() == next {
             return Ok(());

@@ -66,7 +66,7 @@ impl Experiment {
             return Ok(());
         }
         let fixed: Vec<_> = self.search.fixed(study.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
-        let in_study = self.study.waiting().next().is_some();
+        let in_study = self.next_in_study().is_some();
         let revision = self.next_revision();
         let mut open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
         self.restore_changes(&mut open)?;
@@ -148,9 +148,10 @@ impl Experiment {
         if let Some(verdict) = &self.pending_verdict {
             let trial = verdict.suggestion.trial;
             fork.tell(trial, verdict.outcome)?;
-            if verdict.rerun {
+            if let Some(first_after) = verdict.rerun {
                 let (parameters, origin) = queue::rerun_of(self.study.trial(trial)?);
-                fork.enqueue(&parameters, &origin.attributes())?;
+                let rerun = fork.enqueue(&parameters, &origin.attributes())?;
+                queue::move_ahead(&mut fork, rerun, first_after)?;
             }
         }
         Ok(fork)
@@ -238,9 +239,10 @@ impl Experiment {
                 self.log(RequestRefusal::EndedElsewhere(trial).to_string());
                 self.rows.remove(&trial);
             }
-            if verdict.rerun {
+            if let Some(first_after) = verdict.rerun {
                 let (parameters, origin) = queue::rerun_of(self.study.trial(trial)?);
-                queued = queue::queue_again(&mut self.study, trial, &parameters, &origin)?;
+                let rerun = queue::queue_again(&mut self.study, trial, &parameters, &origin)?;
+                queued = rerun.map(|rerun| queue::move_ahead(&mut self.study, rerun, first_after)).transpose()?;
             }
             // Only now: after an error above it is still to be reported.
             self.pending_verdict = None;

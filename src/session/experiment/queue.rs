@@ -140,6 +140,22 @@ pub fn rerun_of(trial: &Trial) -> (ParameterValues, Origin) {
     (trial.parameters.clone().into(), Origin::rerun_of(trial.number, source, gains))
 }
 
+/// Moves a queued trial before those that were queued from number `first_after` on; their points move back by one. Returns the new
+/// number of its point.
+pub fn move_ahead(study: &mut Study, queued: u32, first_after: u32) -> Result<u32, StudyError> {
+    let passed = study.waiting().map(|trial| trial.number).filter(|number| (first_after..queued).contains(number));
+    let passed: Vec<u32> = passed.collect();
+    let mut number = queued;
+    for earlier in passed.into_iter().rev() {
+        // One that has just begun elsewhere stays before it.
+        if !study.exchange_waiting(number, earlier)? {
+            break;
+        }
+        number = earlier;
+    }
+    Ok(number)
+}
+
 /// Queues the repetition of trial `parent` once; another program may have queued it before. Returns its number.
 pub fn queue_again(
     study: &mut Study,

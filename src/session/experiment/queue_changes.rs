@@ -102,9 +102,22 @@ impl Experiment {
         Ok(())
     }
 
+    /// Returns the number of the waiting trial that runs next; none if the study has none yet, as for a re-run whose verdict can still
+    /// be taken back.
+    pub(super) fn next_in_study(&self) -> Option<u32> {
+        let next = self.study.waiting().next().map(|trial| trial.number);
+        next.filter(|_| next != self.first_after_rerun())
+    }
+
+    /// Returns the number of the first waiting trial that was queued after the re-run of the last verdict; none without one.
+    pub(super) fn first_after_rerun(&self) -> Option<u32> {
+        let first_after = self.pending_verdict.as_ref()?.rerun?;
+        self.study.waiting().map(|trial| trial.number).find(|number| *number >= first_after)
+    }
+
     /// Queues the re-run of the last verdict, which is final then: what changes the queue must see it in its place.
     pub(super) fn queue_rerun(&mut self) -> Result<(), RequestRefusal> {
-        if self.pending_verdict.as_ref().is_some_and(|pending| pending.rerun) {
+        if self.pending_verdict.as_ref().is_some_and(|pending| pending.rerun.is_some()) {
             self.report_verdict()?;
         }
         Ok(())

@@ -220,11 +220,14 @@ impl ReplayFeed {
         run.map_or(marker.time_ns, |run| run.row_ns)
     }
 
-    /// Begins of faults and last ticks of trials that fell, in the order of time.
+    /// Begins of faults and last ticks of trials that fell without one, in the order of time.
     fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + use<> {
         let faults = self.recording.markers().iter().filter(|marker| marker.kind == MarkerKind::Fault);
+        let mut places: Vec<u64> = faults.map(|marker| marker.time_ns).collect();
+        let ended_by_fault = |run: &&TrialRun| places.iter().any(|fault| (run.begin_ns..=run.end_ns).contains(fault));
         let fell = self.whole.trials.iter().filter(|run| self.whole.falls.contains(&run.trial));
-        let mut places: Vec<u64> = faults.map(|marker| marker.time_ns).chain(fell.map(last_tick)).collect();
+        let fell: Vec<u64> = fell.filter(|run| !ended_by_fault(run)).map(last_tick).collect();
+        places.extend(fell);
         places.sort_unstable();
         places.into_iter()
     }

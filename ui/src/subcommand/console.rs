@@ -134,7 +134,7 @@ pub struct ConsoleArguments {
     #[arg(long, requires = "resume")]
     accept_backend_change: bool,
     /// Observe only
-    #[arg(long, conflicts_with = "resume")]
+    #[arg(long, conflicts_with_all = ["resume", "approve"])]
     observe: bool,
     /// Jumps that wait for the operator's approval and verdict
     #[arg(long, value_name = "WHAT", default_value = "each", value_parser = approval())]

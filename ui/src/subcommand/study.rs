@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{notice, output};
 use anyhow::Context;
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
 use quadfrog::engine::{
@@ -15,8 +15,8 @@ use quadfrog::engine::{
 };
 use quadfrog::optimize::exchange::{self, TableTrial};
 use quadfrog::optimize::repeats;
-use quadfrog::optimize::study::{Storage, Study};
-use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
+use quadfrog::optimize::study::{Storage, StudyError};
+use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, fixed_in_words, rows_of};
@@ -72,9 +72,9 @@ enum StudySubcommand {
         /// Format of the table [default: by the file's name, else csv]
         #[arg(long, value_name = "FORM", value_parser = read_table_format())]
         format: Option<TableFormat>,
-        /// Queue the points to be run instead; their results are ignored
-        #[arg(long)]
-        queue: bool,
+        /// Queue the points to be run instead: those of all rows, whose results are ignored, or of those that waited in a queue
+        #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "all")]
+        queue: Option<QueuedRows>,
     },
     /// Show the best trial
     Best {
@@ -92,6 +92,15 @@ enum StudySubcommand {
         #[arg(value_name = "PARAM=VALUE", required = true, value_parser = parse_setting)]
         point: Vec<(String, f64)>,
     },
+}
+
+/// The rows of a table that are queued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum QueuedRows {
+    /// All
+    All,
+    /// Those that were queued when the table was written
+    Waiting,
 }
 
 #[derive(Debug, Args)]
@@ -337,8 +346,11 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
             table.finish()
         })?;
         let not_run = opened.rows().iter().filter(|row| row.was_not_run()).count();
-        let of_them = if not_run > 0 { format!(", {not_run} of them not run") } else { String::new() };
-        notice!("{}{of_them}: {}", counted(study.trials().len(), "trial"), path.display());
+        let not_run = if not_run > 0 { format!(", {not_run} of them not run") } else { String::new() };
+        let queued = study.waiting().count();
+        let and_queued = if queued > 0 { format!(" and {}", counted(queued, "queued point")) } else { String::new() };
+        let begun = counted(study.trials().len() - queued, "trial");
+        notice!("{begun}{not_run}{and_queued}: {}", path.display());
         return Ok(());
     }
     let mut bytes = Vec::new();
@@ -349,7 +361,12 @@ fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<
     Ok(())
 }
 
-fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, queue: bool) -> Result<(), Failure> {
+fn import(
+    selector: &StudySelector,
+    table: &Path,
+    format: Option<TableFormat>,
+    queue: Option<QueuedRows>,
+) -> Result<(), Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", table.display()));
     let format = format.or_else(|| format_of_name(table)).unwrap_or(TableFormat::Csv);
     if format == TableFormat::Parquet {
@@ -367,7 +384,24 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
         _ => exchange::from_csv(&text),
     }
     .map_err(|error| refuse(&error))?;
-    let Opened { mut study, ours, .. } = selector.open()?;
+    let mut opened = selector.open()?;
+    let then = until_continued(&opened);
+    let study = &mut opened.study;
+    // All or none: every row is checked before the first is added.
+    let is_asked = |trial: &TableTrial| match queue {
+        None => trial.state.is_finished(),
+        Some(QueuedRows::All) => true,
+        Some(QueuedRows::Waiting) => trial.state == TrialState::Waiting,
+    };
+    for (row, trial) in (1..).zip(&trials).filter(|(_, trial)| is_asked(trial)) {
+        study.check_point(&trial.parameters).map_err(|error| {
+            let remedy = match error {
+                StudyError::Outside { .. } => "; widen them with `B` in the console, or leave the row out",
+                _ => "",
+            };
+            refuse(&format!("row {row}: {error}{remedy}"))
+        })?;
+    }
     // A point that was removed from the queue has never run: its row has no parameters.
     let (trials, without_parameters): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| !trial.parameters.is_empty());
@@ -377,39 +411,35 @@ fn import(selector: &StudySelector, table: &Path, format: Option<TableFormat>, q
     };
     let (finished, unfinished): (Vec<TableTrial>, Vec<TableTrial>) =
         trials.into_iter().partition(|trial| trial.state.is_finished());
-    if !queue {
+    if queue.is_none() {
         let given = finished.len();
-        let added = experiment::import(&mut study, finished).map_err(|error| refuse(&error))?.len();
+        let added = experiment::import(study, finished).map_err(|error| refuse(&error))?.len();
         let mut text = format!("{} imported", counted(added, "trial"));
         if given > added {
             let _ = write!(text, "; {} were there already (same parameters, value and times)", given - added);
         }
         if !unfinished.is_empty() {
-            let _ = write!(text, "; {} ignored, --queue queues them", counted(unfinished.len(), "unfinished trial"));
+            let waited = unfinished.iter().filter(|trial| trial.state == TrialState::Waiting).count();
+            let queue = if waited > 0 { format!(", --queue=waiting queues {waited}") } else { String::new() };
+            let _ = write!(text, "; {} ignored{queue}", counted(unfinished.len(), "unfinished trial"));
         }
         output::text(&(text + &left_out + "\n"));
         return Ok(());
     }
-    let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).collect();
-    // All or none: every point is checked before the first is queued.
-    for point in &points {
-        study.check_point(&point.parameters).map_err(|error| refuse(&error))?;
-    }
+    let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).filter(is_asked).collect();
     for point in &points {
         study.enqueue(&point.parameters, &[])?;
     }
-    output::text(&format!(
-        "{} queued{left_out}{}\n",
-        counted(points.len(), "point"),
-        until_continued(&study, ours.as_ref())
-    ));
+    output::text(&format!("{} queued{left_out}{then}\n", counted(points.len(), "point")));
     Ok(())
 }
 
 /// Says of a study that has all of its trials what makes a queued point run; empty for another study.
-fn until_continued(study: &Study, ours: Option<&StoredStudy>) -> &'static str {
-    let counted = study.trials().iter().filter(|trial| trial.state.is_observed()).count();
-    match ours.and_then(|ours| ours.budget).is_some_and(|budget| counted >= budget as usize) {
+fn until_continued(opened: &Opened) -> &'static str {
+    // Also one whose verdict its session can still take back.
+    let counted = opened.rows().iter().filter(|row| row.counts() && !row.confirms_best()).count();
+    let budget = opened.ours.as_ref().and_then(|ours| ours.budget);
+    match budget.is_some_and(|budget| counted >= budget as usize) {
         true => "; the study has all of its trials: it runs once `C` in the console gives more",
         false => "",
     }
@@ -436,10 +466,10 @@ fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Fail
     if let Some((name, _)) = point.iter().find(|(name, _)| point.iter().filter(|(n, _)| n == name).count() > 1) {
         return Err(Failure::input(format!("{name} is given twice")));
     }
-    let Opened { mut study, ours, .. } = selector.open()?;
-    study.check_point(point)?;
-    let number = study.enqueue(point, &[])?;
-    let then = until_continued(&study, ours.as_ref());
+    let mut opened = selector.open()?;
+    let then = until_continued(&opened);
+    opened.study.check_point(point)?;
+    let number = opened.study.enqueue(point, &[])?;
     output::text(&format!("Queued as trial {number}{then}\n"));
     Ok(())
 }

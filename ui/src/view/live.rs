@@ -267,24 +267,26 @@ fn render_charts(frame: &mut Frame, area: Rect, model: &Model) {
     render_axis(frame, strip, model, series.len().saturating_sub(across * down));
 }
 
+/// Rounds to hundredths; no -0.00 is shown.
+fn in_hundredths(time_s: f64) -> f64 {
+    (time_s * 100.0).round() / 100.0 + 0.0
+}
+
 /// Describes the time axis at the right end of the strip under the charts, and counts the charts without room.
 fn render_axis(frame: &mut Frame, strip: Rect, model: &Model, without_room: usize) {
     let live = &model.live;
     let (role, mut text) = match (&live.comparison, &live.frozen, model.landed()) {
         (Some(c), _, _) => {
-            // In hundredths, so that no -0.00 is shown.
-            let hundredths = ((c.cursor_ns as f64 - c.start_ns as f64) / 1e7).round() as i64;
-            let at_s = hundredths as f64 / 100.0;
+            let at_s = in_hundredths((c.cursor_ns as f64 - c.start_ns as f64) / 1e9);
             (Role::Warning, format!(" A #{} line, B #{} dotted, at {at_s:+.2} s ", c.a.trial, c.b.trial))
         }
         (None, Some((history, _)), _) => {
             let back = (history.newest_ns().saturating_sub(live.cursor_ns)) as f64 / 1e9;
-            (Role::Warning, format!(" cursor -{back:.2} s "))
+            (Role::Warning, format!(" cursor {:.2} s ", in_hundredths(-back)))
         }
         (None, None, Some(landed)) => {
             let under = landed.under.map_or(String::new(), |(under, _)| format!(", #{under} under it"));
-            // In hundredths, so that no -0.00 is shown.
-            let at_s = |time_ns| (landed.trial_time_s(time_ns) * 100.0).round() / 100.0 + 0.0;
+            let at_s = |time_ns| in_hundredths(landed.trial_time_s(time_ns));
             let text = match live.landed_cursor_ns {
                 Some(cursor_ns) => format!(" #{}{under}, at {:+.2} s ", landed.trial, at_s(cursor_ns)),
                 None => {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use quadfrog::trial::QueuedPoint;
+use quadfrog::trial::{ExperimentStage, QueuedPoint};
 use ratatui::text::Line;
 
 use super::draw::span;
@@ -15,23 +15,42 @@ use crate::wrap::{unbroken, wrap, wrap_all};
 const INDENT: usize = 7;
 
 /// Returns the lines of the queued points, each wrapped to `width` columns, and the lines of the `selected` one, which is marked; for
-/// an empty queue how to fill it.
+/// an empty queue how to fill it. Of a finished study they say what makes the points run.
 pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>>, Range<usize>) {
     let theme = &model.theme;
+    let key = |action| model.keymap.key(action);
+    let quiet = |texts: Vec<String>| {
+        let lines: Vec<_> = texts.into_iter().map(|text| Line::from(span(theme, Role::Quiet, text))).collect();
+        wrap_all(&lines, width, 0)
+    };
     let queue = model.session.queue();
+    let finished = model.session.stage_is(ExperimentStage::Finished);
+    let rerun = format!("{} in Trials queues the selected trial again.", key(Action::Rerun));
     if queue.is_empty() {
-        let [point, rerun, form] =
-            [Action::QueuePoint, Action::Rerun, Action::Override].map(|action| model.keymap.key(action));
-        let texts = [
-            "Nothing is queued: the sampler proposes.".to_owned(),
-            String::new(),
-            format!("{point} queues the values of the proposal; in the form of {form} those of the form."),
-            format!("{rerun} in Trials queues the selected trial again."),
-        ];
-        let lines = texts.map(|text| Line::from(span(theme, Role::Quiet, text)));
-        return (wrap_all(&lines, width, 0), 0..0);
+        let more = key(Action::Continue);
+        let texts = match finished {
+            true => vec![format!("Nothing is queued: the study is finished, and {more} gives it more trials."), rerun],
+            false => vec![
+                "Nothing is queued: the sampler proposes.".to_owned(),
+                String::new(),
+                format!(
+                    "{} queues the values of the proposal; in the form of {} those of the form.",
+                    key(Action::QueuePoint),
+                    key(Action::Override)
+                ),
+                rerun,
+            ],
+        };
+        return (quiet(texts), 0..0);
     }
-    let (mut lines, mut of_selected) = (Vec::new(), 0..0);
+    let mut lines = match finished {
+        true => quiet(vec![format!(
+            "The study is finished: these run once {} gives it more trials.",
+            key(Action::Continue)
+        )]),
+        false => Vec::new(),
+    };
+    let mut of_selected = 0..0;
     for (index, point) in queue.iter().enumerate() {
         let role = if index == selected { Role::Selected } else { Role::Text };
         let begin = lines.len();

@@ -6,7 +6,6 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::trial::{TrialRecord, six_digits};
 use tui_input::{Input, InputRequest};
 
-use crate::action::Action;
 use crate::draw::clock_ms;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
@@ -144,8 +143,9 @@ fn submit(model: &mut Model, purpose: Purpose, text: &str) -> Result<Vec<Effect>
                 return Err(format!("there is no trial {number}"));
             }
             if !model.trial_rows().iter().any(|row| row.trial == number) {
-                let keys = [Action::Filter, Action::BestOnly].map(|action| model.keymap.key(action));
-                return Err(format!("the table leaves trial {number} out; {} and {} show others", keys[0], keys[1]));
+                (model.trial_table.filter, model.trial_table.best_only) = (None, false);
+                let text = format!("the table shows all trials: it had left trial {number} out");
+                reply(model, LogLevel::Info, text);
             }
             model.trial_table.selected = Some(number);
             return Ok(Vec::new());
