@@ -11,7 +11,7 @@ use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial};
 use crate::session::experiment::study_attributes::StudyAttributes;
-use crate::session::experiment::{best_of, rows_of};
+use crate::session::experiment::{best_of, confirmation_in_words, judged, rows_of};
 use crate::trial::{ParameterInfo, Task, TrialRecord};
 
 /// Description of a stored study of this program.
@@ -54,6 +54,8 @@ pub struct Opened {
     pub ours: Option<StoredStudy>,
     /// Its parameters with their present bounds.
     pub parameters: Vec<ParameterInfo>,
+    /// Confidence at which a confirmation of the best ends.
+    confidence: f64,
 }
 
 impl Opened {
@@ -65,6 +67,23 @@ impl Opened {
     /// Returns the trial table.
     pub fn rows(&self) -> Vec<TrialRecord> {
         rows_of(&self.study, &self.parameters)
+    }
+
+    /// Copies the study with the verdicts that its session can still take back ([`judged`]).
+    ///
+    /// # Errors
+    /// As of [`judged`].
+    pub fn judged(&self) -> Result<Study, StudyError> {
+        judged(&self.study)
+    }
+
+    /// Returns the state or the result of the newest confirmation of the best as a sentence without its end; none without one, and
+    /// for a study of another program.
+    ///
+    /// # Errors
+    /// As of [`judged`].
+    pub fn confirmation_in_words(&self) -> Result<Option<String>, StudyError> {
+        Ok(self.ours.as_ref().and(confirmation_in_words(&self.judged()?, self.confidence)))
     }
 
     /// Returns the row of the best trial, as a session shows it ([`best_of`]).
@@ -134,7 +153,8 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
         attributes: Vec::new(),
         durability: Durability::Synced,
     };
-    Ok(Opened { study: Study::open(storage.clone(), options)?, ours, parameters })
+    let confidence = config.optimize.confirm.confidence;
+    Ok(Opened { study: Study::open(storage.clone(), options)?, ours, parameters, confidence })
 }
 
 /// Returns the reason for which a study without real-valued parameters is refused.

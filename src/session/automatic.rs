@@ -23,14 +23,13 @@ const SAME_LIMIT_IN_A_ROW: u32 = 10;
 const WAIT_PERIOD: Duration = Duration::from_millis(50);
 
 /// A judged trial.
-#[derive(Clone, Copy)]
 pub struct JudgedTrial<'a> {
     /// The experiment, which includes the trials of other workers.
     pub experiment: &'a Experiment,
     /// Its row.
     pub row: &'a TrialRecord,
-    /// Ticks of its last rollout, countdown included.
-    pub ticks: &'a [Tick],
+    /// Ticks of its last rollout, countdown included. They may be exchanged for a vector that the next rollout fills.
+    pub ticks: &'a mut Vec<Tick>,
     /// Changes of mode during these ticks, with their times on the ticks' clock, ns.
     pub transitions: &'a [(u64, Transition)],
     /// Records up to the begin of the rollout.
@@ -86,7 +85,7 @@ pub fn run<R: Robot>(
 pub fn run_watched<R: Robot>(
     experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
-    mut each: impl FnMut(&JudgedTrial),
+    mut each: impl FnMut(JudgedTrial),
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
     let mut same = SameLimit::default();
@@ -150,12 +149,13 @@ pub fn run_watched<R: Robot>(
             let warning = repeated.filter(|_| suggested != Verdict::Void).map(|count| {
                 format!("{count} trials in a row ended by the same limit, the last because: {cause}. Change the limit, or the bounds in optimize.toml")
             });
+            let (ticks, transitions) = rollout.recorded();
             // Between the rollouts of a trial its row has no verdict.
-            each(&JudgedTrial {
+            each(JudgedTrial {
                 experiment,
                 row,
-                ticks: rollout.ticks(),
-                transitions: rollout.transitions(),
+                ticks,
+                transitions,
                 before: &before,
                 after: &after,
                 cause: &cause,

@@ -29,9 +29,10 @@ impl<R: Robot> Rollout<R> {
         &self.ticks
     }
 
-    /// Changes of mode of the last trial, with their times on the ticks' clock, ns.
-    pub fn transitions(&self) -> &[(u64, Transition)] {
-        &self.transitions
+    /// Ticks of the last trial, countdown included, which may be taken, and its changes of mode with their times on the ticks'
+    /// clock, ns.
+    pub fn recorded(&mut self) -> (&mut Vec<Tick>, &[(u64, Transition)]) {
+        (&mut self.ticks, &self.transitions)
     }
 
     /// The settings of the control cycle.

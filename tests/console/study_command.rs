@@ -53,6 +53,11 @@ fn studies_are_listed_and_shown() {
     let message = program.refused(&["study", "show", "recordings"]);
     let way = "give the folder of a study, as `quadfrog study list recordings` names it";
     assert_shows(&message, &["recordings: this folder holds no study itself (studies in its folders: 1)", way]);
+    // Regression: where one of the studies is in a folder of the name `config`, the folder was taken for a kept configuration.
+    fs::create_dir(program.path("recordings/config")).unwrap();
+    assert_eq!(program.refused(&["study", "show", "recordings"]), message);
+    let refused = program.refused(&["optimize", "--resume", "recordings"]);
+    assert_shows(&refused, &["recordings: there is no study.log in this folder; give the folder of a study"]);
     fs::create_dir(program.path("empty")).unwrap();
     let message = program.refused(&["study", "best", "empty"]);
     assert_shows(&message, &["empty: this folder holds no study; give", "as `quadfrog study list` names it"]);

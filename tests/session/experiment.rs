@@ -732,9 +732,10 @@ fn trials_of_other_workers_are_counted_beside_an_open_proposal_and_end_it_with_t
     ours.refresh().unwrap();
     assert_eq!(counted(&mut ours), None, "published once");
     let kept = ours.proposal().unwrap();
+    assert_eq!(kept.risk.map(|risk| risk.neighbours), Some(2), "the results of the others are near it");
     assert_eq!(
         kept,
-        Proposal { trial: 2, ..seen },
+        Proposal { trial: 2, risk: kept.risk, ..seen },
         "the point that the operator reads stays, with the number of its trial"
     );
 

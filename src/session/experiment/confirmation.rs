@@ -189,14 +189,21 @@ impl BestConfirmation {
 }
 
 /// Returns the state or the result of the newest confirmation of a study as a sentence without its end; none without one.
-pub fn confirmation_in_words(study: &Study) -> Option<String> {
+/// `confidence`: that at which a confirmation ends.
+pub fn confirmation_in_words(study: &Study, confidence: f64) -> Option<String> {
     let kept = StudyAttributes::of(study.attributes());
-    if let Some(running) = kept.confirm {
-        let trials: Vec<String> = running.trials.iter().map(u32::to_string).collect();
-        let left = running.left(study.trials());
-        return Some(format!("the points of trials {} are repeated, at most {left} times more", trials.join(", ")));
-    }
-    let concluded = kept.confirmed?;
+    let concluded = match kept.confirm {
+        Some(running) => match BestConfirmation::new(0, confidence).next(study) {
+            // Its session writes it once the last verdict is final.
+            NextRepeat::Over(concluded, _) => concluded,
+            NextRepeat::Repeat(_) | NextRepeat::None => {
+                let trials: Vec<String> = running.trials.iter().map(u32::to_string).collect();
+                let (trials, left) = (trials.join(", "), running.left(study.trials()));
+                return Some(format!("the points of trials {trials} are repeated, at most {left} times more"));
+            }
+        },
+        None => kept.confirmed?,
+    };
     let points = compared(&concluded.trials, study);
     let leader = points.iter().position(|point| point.trials.contains(&concluded.leader))?;
     let short = match (concluded.sure, repeated(&points)) {

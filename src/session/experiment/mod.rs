@@ -6,7 +6,6 @@
 //! and is therefore what the study itself will propose.
 
 pub(crate) mod attributes;
-mod best;
 mod between_repeats;
 mod changes;
 mod confirmation;
@@ -15,21 +14,23 @@ mod judging;
 mod kept_changes;
 mod liveness;
 mod open_proposal;
+mod other_programs;
 mod plan;
 mod proposal_start;
 mod queue;
 mod queue_changes;
+mod readers;
 mod repeats;
 mod search;
 pub(crate) mod study_attributes;
 mod trial_changes;
 mod verdict_change;
 
-pub use self::best::best_of;
 pub use self::changes::CHANGED_PREFIX;
 pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;
+pub use self::readers::{best_of, judged};
 pub use self::search::fixed_in_words;
 
 use std::collections::BTreeMap;
@@ -37,7 +38,7 @@ use std::sync::Arc;
 
 use self::attributes::TrialAttributes;
 use self::between_repeats::BetweenRepeats;
-use self::confirmation::{BestConfirmation, NextRepeat};
+use self::confirmation::BestConfirmation;
 use self::open_proposal::OpenProposal;
 use self::plan::not_now;
 use self::queue::TrialQueue;
@@ -274,86 +275,6 @@ impl Experiment {
         Ok(())
     }
 
-    /// Sees what other programs have changed a moment ago before a proposal of the sampler becomes a trial: a queued point comes
-    /// first, or takes the number of a proposal that the operator has changed; the last trial may have been run. A queued proposal
-    /// has its number already.
-    fn see_the_queue(&mut self, trial: u32, revision: u32) -> Result<(), RequestRefusal> {
-        let is_open = |experiment: &Experiment| match &experiment.state {
-            ExperimentState::Proposed(open) => !open.is_queued() && open.must_be(trial, revision).is_ok(),
-            _ => false,
-        };
-        if is_open(self) {
-            self.refresh()?;
-            if !is_open(self) {
-                return Err(RequestRefusal::Overtaken(trial));
-            }
-        }
-        Ok(())
-    }
-
-    /// Records the changes of other programs: their trials join the table, and a point that they have queued is proposed
-    /// next if the operator has not changed the proposal. During a trial only the queue is published. To be called regularly.
-    pub fn refresh(&mut self) -> Result<(), RequestRefusal> {
-        if matches!(self.state, ExperimentState::AwaitsPrior) {
-            return Ok(());
-        }
-        self.study.refresh()?;
-        if !self.is_idle() {
-            return Ok(self.publish_changes()?);
-        }
-        let log = self.queue.close_abandoned(&mut self.study)?;
-        self.log_all(log);
-        self.take_rows();
-        match &self.state {
-            ExperimentState::Proposed(open) => {
-                let next = self.next_in_study();
-                let full = |study: &Study| self.queue.occupied(study.trials()) >= self.plan.budget;
-                // The journal does not have the last verdict yet.
-                if full(&self.study) && !open.approved().is_beyond_budget() && full(&self.study_with_verdict()?) {
-                    self.log("other workers have run the trials that were left".to_owned());
-                    self.propose()?;
-                } else if next != open.waits_as() && !open.is_changed() {
-                    self.warn("another program has changed the queue: another point is proposed".to_owned());
-                    self.propose()?;
-                } else {
-                    self.renumber()?;
-                }
-                self.publish_changes()?;
-            }
-            _ => {
-                let room = self.queue.occupied(self.study.trials()) < self.plan.budget;
-                let queued = self.study.waiting().any(attributes::confirms);
-                // A repeat of another worker may have been void, or may have been the last.
-                let confirms =
-                    self.pending_verdict.is_none() && !matches!(self.confirmation.next(&self.study), NextRepeat::None);
-                if room || queued || confirms {
-                    self.propose()?;
-                }
-                self.publish_changes()?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Gives the open proposal the number that its trial will have: another program has added trials. Its values and its revision
-    /// stay, and with them a question that is open.
-    fn renumber(&mut self) -> Result<(), StudyError> {
-        let next = self.first_after_rerun().unwrap_or(self.study.trials().len() as u32);
-        let ExperimentState::Proposed(open) = &self.state else { return Ok(()) };
-        if open.waits_as().is_some() || open.number() == next {
-            return Ok(());
-        }
-        self.rename_kept_changes(next)?;
-        let ExperimentState::Proposed(open) = &mut self.state else { return Ok(()) };
-        open.set_number(next);
-        if open.is_changed() {
-            self.warn(format!("another program has added trials: {}", self.overrides_in_words()));
-        }
-        self.publish_proposal();
-        self.publish_stage(next);
-        Ok(())
-    }
-
     /// Returns the wait of this experiment for the lock of its study.
     pub fn journal_wait(&self) -> JournalWait {
         self.study.journal_wait()
@@ -387,21 +308,6 @@ impl Experiment {
 
     fn is_idle(&self) -> bool {
         matches!(self.state, ExperimentState::Proposed(_) | ExperimentState::Finished)
-    }
-
-    /// Adds the trials that other programs have run or are running to the table.
-    fn take_rows(&mut self) {
-        for trial in self.study.trials() {
-            let news = match self.rows.get(&trial.number) {
-                None => trial.state != TrialState::Waiting,
-                Some(row) => trial.state.is_finished() && row.verdict.is_none(),
-            };
-            if news {
-                let row = attributes::row_of(trial, self.study.note_of(trial.number), &self.plan.parameters);
-                self.outbox.push(Record::Trial(row.clone()));
-                self.rows.insert(trial.number, row);
-            }
-        }
     }
 
     fn enter(&mut self, state: ExperimentState, trial: u32) {

@@ -94,6 +94,11 @@ impl OpenProposal {
         self.draft.number = number;
     }
 
+    /// Takes the results of `study` for its risk and for what is expected of its values.
+    pub fn see(&mut self, study: Study) {
+        self.study = study;
+    }
+
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
     pub fn waits_as(&self) -> Option<u32> {
         (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())

@@ -87,21 +87,6 @@ impl Experiment {
         Ok(self.propose()?)
     }
 
-    /// Publishes trials of other workers, and what another program has changed behind the next point of the queue. The proposal
-    /// stays.
-    pub(super) fn publish_changes(&mut self) -> Result<(), StudyError> {
-        let stored = self.study.trials().len();
-        let shown = self.published_search.iter().flat_map(|search| &search.queue);
-        // Beyond them are a re-run and a repeat of the best that the study does not have yet.
-        let shown: Vec<&QueuedPoint> = shown.filter(|point| (point.trial as usize) < stored).collect();
-        let counted = self.published_search.as_ref().map(|search| search.counted);
-        if counted != Some(self.counted()) || !queued_points(&self.study).iter().eq(shown) {
-            let study = self.study_with_verdict()?;
-            self.publish_search(&study);
-        }
-        Ok(())
-    }
-
     /// Returns the number of the waiting trial that runs next; none if the study has none yet, as for a re-run whose verdict can still
     /// be taken back.
     pub(super) fn next_in_study(&self) -> Option<u32> {

@@ -244,6 +244,16 @@ impl SessionModel {
         let spread = point.deviation.map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
         let sure = match point.confidence {
             Some(confidence) => format!("with {:.1} % confidence", 100.0 * confidence),
+            // The deviation of equal values is that of the rounding of their mean.
+            None if self
+                .trials
+                .points
+                .iter()
+                .filter(|point| point.contender)
+                .all(|p| p.deviation.is_some_and(|d| d < 1e-9)) =>
+            {
+                "without a confidence, because equal jumps give equal values here".to_owned()
+            }
             None => "without a confidence".to_owned(),
         };
         let unit = &self.info.unit;

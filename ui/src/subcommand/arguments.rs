@@ -13,7 +13,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap_complete::ArgValueCandidates;
 use nix::unistd::{User, getuid};
 use quadfrog::config::Config;
-use quadfrog::engine::{Provenance, check_kept_config, newest_config};
+use quadfrog::engine::{Provenance, STUDY_FILE, check_kept_config, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::printable::is_unprintable;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
@@ -264,7 +264,8 @@ impl StudyArguments {
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with, else as
     /// [`load_config_for`]. Returns also the notice that it is that of the study: for when the study was not refused.
     pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<(Config, Option<String>), Failure> {
-        let own = resume.filter(|_| self.config.is_none()).and_then(newest_config).map(|(_, config)| config);
+        let resumed = resume.filter(|folder| self.config.is_none() && folder.join(STUDY_FILE).is_file());
+        let own = resumed.and_then(newest_config).map(|(_, config)| config);
         if let Some(own) = &own {
             check_kept_config(own)?;
         }

@@ -19,7 +19,7 @@ use quadfrog::optimize::study::{Storage, StudyError};
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
-use quadfrog::session::experiment::{self, CHANGED_PREFIX, confirmation_in_words, fixed_in_words, rows_of};
+use quadfrog::session::experiment::{self, CHANGED_PREFIX, fixed_in_words, rows_of};
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, counted, six_digits};
 use serde_json::Value;
 
@@ -63,6 +63,8 @@ enum StudySubcommand {
         output: Option<PathBuf>,
     },
     /// Add the trials of a table, written by `study export` or Optuna's trials_dataframe, as finished trials
+    ///
+    /// The study must exist. A console that is quit without a jump (key `q`) leaves an empty one.
     Import {
         #[command(flatten)]
         study: StudySelector,
@@ -134,7 +136,8 @@ impl StudySelector {
     /// Returns the last configuration that the study ran with, if its folder holds one, else the built-in one.
     fn config(&self) -> Result<Config, Failure> {
         let own = match parse_storage(&self.place) {
-            Storage::File(file) => file.parent().and_then(newest_config),
+            // A folder of studies may have one of the name `config`.
+            Storage::File(file) if file.is_file() => file.parent().and_then(newest_config),
             _ => None,
         };
         Ok(Config::load(own.as_ref().map(|(_, config)| config.as_path()))?)
@@ -227,7 +230,7 @@ fn in_words(value: &Value, between: &str) -> String {
 
 fn show(selector: &StudySelector) -> Result<(), Failure> {
     let opened = selector.open()?;
-    let Opened { study, ours, parameters } = &opened;
+    let Opened { study, ours, parameters, .. } = &opened;
     output::unbroken(&format!("{} in", study.options().name), &parse_storage(&selector.place).to_string());
     let mut text = String::new();
     // The causes of changed verdicts stand in the table; the values that are changed for the next trial are the console's.
@@ -245,7 +248,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         if let Some(samplers) = experiment::samplers_in_words(study) {
             let _ = writeln!(text, "  proposed: {samplers}");
         }
-        if let Some(confirmation) = confirmation_in_words(study) {
+        if let Some(confirmation) = opened.confirmation_in_words()? {
             let _ = writeln!(text, "  confirmation of the best: {confirmation}");
         }
     }
@@ -279,7 +282,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
     }
-    for point in repeats::points(study.trials()).iter().filter(|point| point.repeats() > 1) {
+    for point in repeats::points(opened.judged()?.trials()).iter().filter(|point| point.repeats() > 1) {
         let trials = point.trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
         let (stood, repeats, mean, std) =
             (point.without_fall, point.repeats(), point.mean(), point.deviation().unwrap_or(0.0));

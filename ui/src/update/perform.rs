@@ -199,7 +199,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Beside => return beside::begin(model),
         Action::EndComparison => {
             beside::no_ghost(model);
-            reply(model, LogLevel::Info, "no trial is beside another any longer");
+            reply(model, LogLevel::Info, "no trial is compared any longer");
             return beside::ended(model);
         }
         Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),

@@ -18,7 +18,7 @@ pub fn render(frame: &mut Frame, areas: CompactAreas, model: &Model) {
     let CompactAreas { frame: top, trial, hint, message, next_step } = areas;
     status_bar::render(frame, top, model);
     proposal::render(frame, trial, model);
-    let text = format!(" the views need {MIN_COLUMNS}x{MIN_ROWS}; all other keys work");
+    let text = format!(" the view {} needs {MIN_COLUMNS}x{MIN_ROWS}; all keys work", model.view.name());
     frame.render_widget(Line::from(span(&model.theme, Role::Quiet, text)), hint);
     dialogs::render(frame, trial, model);
     countdown::render(frame, trial, model);

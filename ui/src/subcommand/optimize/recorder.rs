@@ -16,7 +16,7 @@ const TICK_NS: u64 = 1_000_000;
 /// Source of this program's lines in the log.
 const SOURCE: &str = "optimize";
 
-/// One rollout with its records.
+/// One rollout with its records. Its ticks are several megabytes: they are taken, not copied.
 pub struct RecordedRollout {
     before: Vec<Record>,
     ticks: Vec<Tick>,
@@ -25,8 +25,8 @@ pub struct RecordedRollout {
 }
 
 impl RecordedRollout {
-    /// Copies a judged trial with its line of the log.
-    pub fn of(trial: &JudgedTrial) -> RecordedRollout {
+    /// Copies the records of a judged trial with its line of the log and takes its ticks; the next rollout fills `spare`.
+    pub fn of(trial: JudgedTrial, spare: Vec<Tick>) -> RecordedRollout {
         let mut after = trial.after.to_vec();
         let log = |level, message| Record::Log(LogRecord { level, source: SOURCE.to_owned(), message });
         let verdict = trial.row.verdict.map_or("its next rollout follows", Verdict::name);
@@ -34,10 +34,15 @@ impl RecordedRollout {
         after.extend(trial.warning.map(|warning| log(LogLevel::Warning, warning.to_owned())));
         RecordedRollout {
             before: trial.before.to_vec(),
-            ticks: trial.ticks.to_vec(),
+            ticks: std::mem::replace(trial.ticks, spare),
             transitions: trial.transitions.to_vec(),
             after,
         }
+    }
+
+    /// Its ticks, to be filled by another rollout.
+    pub fn into_ticks(self) -> Vec<Tick> {
+        self.ticks
     }
 }
 

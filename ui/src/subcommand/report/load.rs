@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
+use quadfrog::engine::{EngineError, Opened, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -12,7 +12,7 @@ use quadfrog::report::configuration;
 use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::session::experiment::{confirmation_in_words, fixed_in_words};
+use quadfrog::session::experiment::fixed_in_words;
 use quadfrog::trial::{Backend, PredictedTrial};
 use serde_json::Value;
 
@@ -101,7 +101,7 @@ fn reported(
         best: best.map(|best| best.trial),
         other_gains_of_best: best.map_or(String::new(), |best| best.other_gains(&configured)),
         rows,
-        confirmation: ours.and_then(|_| confirmation_in_words(study)),
+        confirmation: opened.confirmation_in_words().map_err(EngineError::from)?,
         fixed: ours.map_or_else(Vec::new, |_| fixed_in_words(study)),
         model_best: study.model_best().map(|best| PredictedTrial {
             trial: best.trial,

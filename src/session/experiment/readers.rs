@@ -1,8 +1,23 @@
-//! The best trial of a table, chosen alike in its session and where its study is read.
+//! A study for its readers, who are to see the same as its session.
 
+use super::attributes::TrialAttributes;
 use crate::optimize::repeats::{RepeatedPoint, improvements, points};
-use crate::optimize::study::{ModelBest, Study};
+use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::trial::{TrialRecord, Verdict};
+
+/// Copies `study` with every verdict that its session can still take back reported in the copy: no reader has to know of the wait.
+///
+/// # Errors
+/// When the copy cannot be changed.
+pub fn judged(study: &Study) -> Result<Study, StudyError> {
+    let verdicts: Vec<(u32, Outcome)> =
+        study.running().filter_map(|trial| Some((trial.number, TrialAttributes::of(trial).outcome()?))).collect();
+    let mut copy = study.fork();
+    for (trial, outcome) in verdicts {
+        copy.tell(trial, outcome)?;
+    }
+    Ok(copy)
+}
 
 /// Returns the best of `rows`, which are trials of `study` by their numbers: `by_model`, the best by the sampler's model; without
 /// one the accepted feasible trial whose point has the best value, the earliest of equals. The value of a repeated point is the mean
