@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::optimize::ask::{Direction, SamplerConfig};
 use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space};
-use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
+use crate::optimize::study::{ModelBest, Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial};
 use crate::session::experiment::study_attributes::StudyAttributes;
 use crate::session::experiment::{best_of, confirmation_in_words, judged, rows_of};
@@ -54,8 +54,9 @@ pub struct Opened {
     pub ours: Option<StoredStudy>,
     /// Its parameters with their present bounds.
     pub parameters: Vec<ParameterInfo>,
-    /// Confidence at which a confirmation of the best ends.
-    confidence: f64,
+    /// Best trial by the sampler's model, a verdict that can still be taken back included.
+    model_best: Option<ModelBest>,
+    confirmation: Option<String>,
 }
 
 impl Opened {
@@ -69,26 +70,20 @@ impl Opened {
         rows_of(&self.study, &self.parameters)
     }
 
-    /// Copies the study with the verdicts that its session can still take back ([`judged`]).
-    ///
-    /// # Errors
-    /// As of [`judged`].
-    pub fn judged(&self) -> Result<Study, StudyError> {
-        judged(&self.study)
+    /// Returns the state or the result of the newest confirmation of the best, when the study was opened, as a sentence without its
+    /// end; none without one, and for a study of another program.
+    pub fn confirmation_in_words(&self) -> Option<&str> {
+        self.confirmation.as_deref()
     }
 
-    /// Returns the state or the result of the newest confirmation of the best as a sentence without its end; none without one, and
-    /// for a study of another program.
-    ///
-    /// # Errors
-    /// As of [`judged`].
-    pub fn confirmation_in_words(&self) -> Result<Option<String>, StudyError> {
-        Ok(self.ours.as_ref().and(confirmation_in_words(&self.judged()?, self.confidence)))
+    /// Returns the best trial by the sampler's model when the study was opened; none if trials have finished since it was stored.
+    pub fn model_best(&self) -> Option<ModelBest> {
+        self.model_best
     }
 
     /// Returns the row of the best trial, as a session shows it ([`best_of`]).
     pub fn best<'a>(&self, rows: &'a [TrialRecord]) -> Option<&'a TrialRecord> {
-        best_of(&self.study, rows.iter(), self.study.model_best())
+        best_of(&self.study, rows.iter(), self.model_best)
     }
 }
 
@@ -153,8 +148,10 @@ pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Re
         attributes: Vec::new(),
         durability: Durability::Synced,
     };
-    let confidence = config.optimize.confirm.confidence;
-    Ok(Opened { study: Study::open(storage.clone(), options)?, ours, parameters, confidence })
+    let study = Study::open(storage.clone(), options)?;
+    let judged = judged(&study)?;
+    let confirmation = ours.as_ref().and(confirmation_in_words(&judged, config.optimize.confirm.confidence));
+    Ok(Opened { model_best: judged.model_best(), study, ours, parameters, confirmation })
 }
 
 /// Returns the reason for which a study without real-valued parameters is refused.

@@ -4,16 +4,20 @@
 use crate::support;
 use std::sync::Arc;
 
+use quadfrog::config::Config;
+use quadfrog::engine::{STUDY_FILE, open_stored};
 use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
+use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::mt19937::Mt19937;
 use quadfrog::optimize::prior::{Prior, PriorModel, World};
 use quadfrog::optimize::sobol::Sobol;
 use quadfrog::optimize::space::{Parameter, Range};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use quadfrog::optimize::trial::TrialState;
 use quadfrog::recording::record::Record;
-use quadfrog::session::experiment::Experiment;
+use quadfrog::session::experiment::{Experiment, import};
 use quadfrog::telemetry::TrialEnd;
-use quadfrog::trial::{ProposalInsight, Verdict};
+use quadfrog::trial::{ExperimentStage, ProposalInsight, Verdict};
 use support::{approve, far, plan, ticks};
 
 fn study(kind: SamplerKind, storage: Storage) -> Study {
@@ -183,4 +187,45 @@ fn a_sampler_without_a_model_expects_nothing() {
         let insight = newest_insight(&mut experiment);
         assert!(insight.predicted.is_empty() && insight.best.is_none() && insight.simulator.is_none());
     }
+}
+
+/// Regression: as long as a verdict could be taken back, readers chose the best trial without the model, and the session with it.
+#[test]
+fn readers_have_the_best_of_the_session_by_the_model_after_every_verdict_and_after_an_import() {
+    let folder = tempfile::tempdir().unwrap();
+    let storage = || Storage::File(folder.path().join(STUDY_FILE));
+    let mut experiment = Experiment::open(plan(9), study(SamplerKind::Gp, storage())).unwrap();
+    let agree = |experiment: &Experiment, when: &str| {
+        let opened = open_stored(&storage(), None, &Config::load(None).unwrap()).unwrap();
+        assert_eq!(opened.model_best(), experiment.model_best(), "{when}");
+        let best = opened.best(&opened.rows()).map(|best| best.trial);
+        assert_eq!(best, experiment.best().map(|best| best.trial), "{when}");
+    };
+    for trial in 0..8 {
+        run(&mut experiment, 1, &[5]);
+        agree(&experiment, &format!("after trial {trial}"));
+    }
+    experiment.undo().unwrap();
+    agree(&experiment, "after the undo");
+    experiment.judge(Verdict::Fall, false).unwrap();
+    agree(&experiment, "judged a fall");
+    run(&mut experiment, 1, &[]);
+    assert_eq!(experiment.stage(), ExperimentStage::Finished);
+    agree(&experiment, "with the last trial");
+    let opened = open_stored(&storage(), None, &Config::load(None).unwrap()).unwrap();
+    let best = opened.rows().into_iter().find(|row| Some(row.trial) == opened.model_best().map(|best| best.trial));
+    let table = TableTrial {
+        state: TrialState::Complete,
+        value: Some(5.0),
+        parameters: best.unwrap().parameters.to_vec(),
+        attributes: serde_json::Map::new(),
+        started: None,
+        completed: None,
+        note: String::new(),
+    };
+    let imported = import(&mut study(SamplerKind::Gp, storage()), vec![table]).unwrap();
+    experiment.refresh().unwrap();
+    assert_eq!(experiment.model_best().map(|best| best.learned), Some(10));
+    assert!(experiment.row(imported[0]).is_some());
+    agree(&experiment, "after the import");
 }

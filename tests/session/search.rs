@@ -5,15 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use quadfrog::config::Config;
-use quadfrog::engine::{STUDY_FILE, open_stored};
 use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
-use quadfrog::optimize::repeats::points;
-use quadfrog::optimize::study::{Storage, Study};
 use quadfrog::optimize::trial::TrialState;
 use quadfrog::recording::record::Record;
-use quadfrog::session::experiment::{Experiment, RequestRefusal, confirmation_in_words, fixed_in_words, import};
+use quadfrog::session::experiment::{
+    Experiment, RequestRefusal, confirmation_in_words, fixed_in_words, import, judged, points_of_rows, rows_of,
+};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, Proposal, ProposalInsight, ProposalSource, SearchStatus, Verdict,
@@ -374,14 +372,12 @@ fn equal_repeats_give_no_confidence() {
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("leads without a confidence, because equal jumps give equal values here"), "{words}");
     // Regression: a reader was told of repeats to come, as long as the last verdict could be taken back.
-    let storage = Storage::File(folder.path().join(STUDY_FILE));
-    let opened = open_stored(&storage, None, &Config::load(None).unwrap()).unwrap();
-    let read = confirmation_in_words(&opened.judged().unwrap(), 0.95).expect("a confirmation");
-    assert!(words.ends_with(&read), "{read}");
-    let trials = |study: &Study| points(study.trials()).into_iter().map(|point| point.trials).collect::<Vec<_>>();
-    let shown: Vec<Vec<u32>> = news.points.iter().map(|point| point.trials.clone()).collect();
-    let judged = trials(&opened.judged().unwrap());
-    assert!(shown.iter().all(|of_point| judged.contains(of_point)), "{judged:?}, {shown:?}");
+    let read = study_in(folder.path());
+    let in_words = confirmation_in_words(&judged(&read).unwrap(), 0.95).expect("a confirmation");
+    assert!(words.ends_with(&in_words), "{in_words}");
+    let rows = rows_of(&read, &plan(0).parameters);
+    let points: Vec<Vec<u32>> = points_of_rows(rows.iter()).into_iter().map(|point| point.trials).collect();
+    assert!(news.points.iter().all(|point| points.contains(&point.trials)), "{points:?}, {:?}", news.points);
     experiment.close().unwrap();
     let kept = confirmation_in_words(&study_in(folder.path()), 0.95).expect("it is kept");
     assert!(words.ends_with(&kept), "{kept}");

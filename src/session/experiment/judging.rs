@@ -146,7 +146,7 @@ impl Experiment {
         let rerun = rerun.then_some(self.study.trials().len() as u32);
         self.pending_verdict = Some(PendingVerdict { suggestion, outcome, rerun });
         self.propose()?;
-        Ok(())
+        Ok(self.store_model_best()?)
     }
 
     /// Takes the last verdict back.
@@ -173,7 +173,7 @@ impl Experiment {
         self.publish_row(trial);
         self.enter(ExperimentState::Review(trial), trial);
         self.publish_model(trial);
-        Ok(())
+        Ok(self.store_model_best()?)
     }
 
     /// Uses a value measured by hand for the trial under review; none returns to the measured one.

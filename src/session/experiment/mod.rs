@@ -30,7 +30,7 @@ pub use self::changes::CHANGED_PREFIX;
 pub use self::confirmation::confirmation_in_words;
 pub use self::plan::{ExperimentPlan, RequestRefusal};
 pub use self::proposal_start::next_seed;
-pub use self::readers::{best_of, judged};
+pub use self::readers::{best_of, judged, points_of_rows};
 pub use self::search::fixed_in_words;
 
 use std::collections::BTreeMap;

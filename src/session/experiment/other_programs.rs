@@ -64,8 +64,11 @@ impl Experiment {
                 // A repeat of another worker may have been void, or may have been the last.
                 let confirms =
                     self.pending_verdict.is_none() && !matches!(self.confirmation.next(&self.study), NextRepeat::None);
-                if room || queued || confirms {
+                if room || queued || confirms || results {
                     self.propose()?;
+                }
+                if results {
+                    self.store_model_best()?;
                 }
                 self.publish_changes()?;
             }
@@ -111,11 +114,13 @@ impl Experiment {
     fn see_results(&mut self) -> Result<(), StudyError> {
         let study = self.study_with_verdict()?;
         let model = study.predict();
+        self.model_best = model.best;
+        self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
         let ExperimentState::Proposed(open) = &mut self.state else { return Ok(()) };
         open.see(study);
         self.outbox.push(Record::Insight(open.insight(&model)));
         self.publish_proposal();
-        Ok(())
+        self.store_model_best()
     }
 
     /// Adds the trials that other programs have run or are running to the table. Returns whether there are new results.

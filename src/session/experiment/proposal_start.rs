@@ -247,11 +247,14 @@ impl Experiment {
             // Only now: after an error above it is still to be reported.
             self.pending_verdict = None;
         }
-        if let Some(best) = self.model_best {
-            self.study.store_best(best)?;
-        }
+        self.store_model_best()?;
         self.confirmation.write_conclusion(&mut self.study)?;
         Ok(queued)
+    }
+
+    /// Stores the best trial by the sampler's model for the readers of the study, who count a verdict that can still be taken back.
+    pub(super) fn store_model_best(&mut self) -> Result<(), StudyError> {
+        self.model_best.map_or(Ok(()), |best| self.study.store_best(best))
     }
 
     /// Refuses while a trial runs or is under review.

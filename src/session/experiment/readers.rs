@@ -1,7 +1,7 @@
 //! A study for its readers, who are to see the same as its session.
 
 use super::attributes::TrialAttributes;
-use crate::optimize::repeats::{RepeatedPoint, improvements, points};
+use crate::optimize::repeats::{RepeatResult, RepeatedPoint, improvements, points_of};
 use crate::optimize::study::{ModelBest, Outcome, Study, StudyError};
 use crate::trial::{TrialRecord, Verdict};
 
@@ -19,6 +19,19 @@ pub fn judged(study: &Study) -> Result<Study, StudyError> {
     Ok(copy)
 }
 
+/// Returns the points of the trials that count, in the order of their first trials, with verdicts that can still be taken back.
+pub fn points_of_rows<'a>(rows: impl Iterator<Item = &'a TrialRecord>) -> Vec<RepeatedPoint> {
+    points_of(rows.filter_map(|row| {
+        Some(RepeatResult {
+            trial: row.trial,
+            parameters: &row.parameters,
+            gains: &row.gains,
+            value: row.value.filter(|_| row.has_result())?,
+            is_fall: row.verdict != Some(Verdict::Accept),
+        })
+    }))
+}
+
 /// Returns the best of `rows`, which are trials of `study` by their numbers: `by_model`, the best by the sampler's model; without
 /// one the accepted feasible trial whose point has the best value, the earliest of equals. The value of a repeated point is the mean
 /// of its repeats ([`crate::optimize::repeats`]). A verdict that its session can still take back counts.
@@ -30,7 +43,7 @@ pub fn best_of<'a>(
     if let Some(best) = by_model.and_then(|best| rows.clone().find(|row| row.trial == best.trial)) {
         return Some(best);
     }
-    let points = points(study.trials());
+    let points = points_of_rows(rows.clone());
     let mean = |number| points.iter().find(|point| point.trials.contains(&number)).map(RepeatedPoint::mean);
     let is_feasible = |row: &&TrialRecord| study.trial(row.trial).is_ok_and(|trial| trial.violation() <= 0.0);
     let accepted = rows.filter(|row| row.verdict == Some(Verdict::Accept)).filter(is_feasible);

@@ -68,9 +68,7 @@ impl Experiment {
         }
         self.publish_row(trial);
         self.propose()?;
-        if let Some(best) = self.model_best.filter(|_| self.pending_verdict.is_none()) {
-            self.study.store_best(best)?;
-        }
+        self.store_model_best()?;
         Ok(name)
     }
 }

@@ -4,7 +4,8 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use quadfrog::optimize::ask::Direction;
-use quadfrog::optimize::repeats::{RepeatResult, contenders_of, improvements, least_repeats, points_of};
+use quadfrog::optimize::repeats::{contenders_of, improvements, least_repeats};
+use quadfrog::session::experiment::points_of_rows;
 use quadfrog::trial::{JudgedBy, ParameterInfo, PointRecord, PredictedTrial, TrialRecord, Verdict};
 
 use crate::column::Column;
@@ -70,17 +71,8 @@ impl Trials {
     /// Repeats that a confirmation of the best needs at least: of the `contenders` best points those with an
     /// accepted trial are compared.
     pub fn least_repeats(&self, contenders: usize) -> usize {
-        let results = self.records.values().filter_map(|row| {
-            Some(RepeatResult {
-                trial: row.trial,
-                parameters: &row.parameters,
-                gains: &row.gains,
-                value: row.value.filter(|_| row.has_result())?,
-                is_fall: row.verdict != Some(Verdict::Accept),
-            })
-        });
-        let best =
-            contenders_of(points_of(results), Direction::Maximize, contenders, self.best().map(|best| best.trial));
+        let points = points_of_rows(self.records.values());
+        let best = contenders_of(points, Direction::Maximize, contenders, self.best().map(|best| best.trial));
         least_repeats(best.iter().filter(|point| point.without_fall > 0))
     }
 

@@ -14,7 +14,6 @@ use quadfrog::engine::{
     study_name,
 };
 use quadfrog::optimize::exchange::{self, TableTrial};
-use quadfrog::optimize::repeats;
 use quadfrog::optimize::study::{Storage, StudyError};
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
@@ -248,7 +247,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         if let Some(samplers) = experiment::samplers_in_words(study) {
             let _ = writeln!(text, "  proposed: {samplers}");
         }
-        if let Some(confirmation) = opened.confirmation_in_words()? {
+        if let Some(confirmation) = opened.confirmation_in_words() {
             let _ = writeln!(text, "  confirmation of the best: {confirmation}");
         }
     }
@@ -282,7 +281,7 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
     for row in rows.iter().filter(|row| !row.note.is_empty()) {
         let _ = writeln!(text, "Note on trial {}: {}", row.trial, row.note);
     }
-    for point in repeats::points(opened.judged()?.trials()).iter().filter(|point| point.repeats() > 1) {
+    for point in experiment::points_of_rows(rows.iter()).iter().filter(|point| point.repeats() > 1) {
         let trials = point.trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
         let (stood, repeats, mean, std) =
             (point.without_fall, point.repeats(), point.mean(), point.deviation().unwrap_or(0.0));
@@ -334,7 +333,7 @@ fn session_has_ended(storage: &Storage) -> bool {
 fn best_line(config: &Config, opened: &Opened, rows: &[TrialRecord]) -> String {
     let configured = opened.ours.as_ref().map(|ours| config.task(ours.task).gains().values()).unwrap_or_default();
     let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
-    table::best_line(opened.best(rows), opened.study.model_best(), &configured, opened.unit(), &units)
+    table::best_line(opened.best(rows), opened.model_best(), &configured, opened.unit(), &units)
 }
 
 fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{EngineError, Opened, newest_config, open_stored, stored_studies, study_files, study_name};
+use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -101,9 +101,9 @@ fn reported(
         best: best.map(|best| best.trial),
         other_gains_of_best: best.map_or(String::new(), |best| best.other_gains(&configured)),
         rows,
-        confirmation: opened.confirmation_in_words().map_err(EngineError::from)?,
+        confirmation: opened.confirmation_in_words().map(str::to_owned),
         fixed: ours.map_or_else(Vec::new, |_| fixed_in_words(study)),
-        model_best: study.model_best().map(|best| PredictedTrial {
+        model_best: opened.model_best().map(|best| PredictedTrial {
             trial: best.trial,
             value: best.predicted,
             deviation: best.predicted_deviation,
