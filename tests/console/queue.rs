@@ -57,6 +57,20 @@ fn session_with_queue(folder: &Path) -> (Session, PathBuf) {
     (session, study)
 }
 
+/// Regression: the answer said that the parameters of a re-run are proposed again, and another point was.
+#[test]
+fn the_answer_to_a_rerun_names_what_was_queued_before_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut session, _) = session_with_queue(folder.path());
+    session.send("\r");
+    session.wait_for(&["Press A to arm"]);
+    jump(&mut session);
+    session.send("r");
+    session.wait_for(&["trial 0 is void, and its parameters are queued; trial 1 comes first"]);
+    session.send("N");
+    session.wait_for(&["#3    re-run of #0"]);
+}
+
 /// Regression: the queue view of a finished study did not show what another program had queued since, nor say when it runs; and that
 /// program said nothing of it while the last verdict could be taken back. An exported table's queued points were counted as trials.
 #[test]

@@ -11,8 +11,15 @@ use crate::trial::{ExperimentStage, FixedParameter, Verdict, counted, four_digit
 /// Carries out a request of `asker`. One that is not of the study is refused.
 pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest, asker: Asker) -> JobOutput {
     let before = Before::of(experiment, request);
-    let trial = experiment.under_review().map_or(String::new(), |row| format!("trial {}", row.trial));
-    let again = format!("{trial} is void, and its parameters are proposed again");
+    let number = experiment.under_review().map(|row| row.trial);
+    let trial = number.map_or(String::new(), |number| format!("trial {number}"));
+    // What was queued already comes before a re-run.
+    let again = |experiment: &Experiment| match experiment.proposal() {
+        Some(next) if next.parent != number && Some(next.trial) != number => {
+            format!("{trial} is void, and its parameters are queued; trial {} comes first", next.trial)
+        }
+        _ => format!("{trial} is void, and its parameters are proposed again"),
+    };
     let output = match request {
         OperatorRequest::Judge(verdict) => {
             let answer = format!("{trial}; u takes it back until the next trial");
@@ -22,11 +29,17 @@ pub fn carry_out(experiment: &mut Experiment, request: &OperatorRequest, asker: 
             };
             judged(done, answer)
         }
-        OperatorRequest::Rerun { trial: None } => judged(experiment.judge(Verdict::Void, true), again),
+        OperatorRequest::Rerun { trial: None } => {
+            let done = experiment.judge(Verdict::Void, true);
+            judged(done, again(experiment))
+        }
         OperatorRequest::VoidBecause { reason, rerun: false } => {
             judged(experiment.void_because(reason, false), format!("{trial} is void"))
         }
-        OperatorRequest::VoidBecause { reason, rerun: true } => judged(experiment.void_because(reason, true), again),
+        OperatorRequest::VoidBecause { reason, rerun: true } => {
+            let done = experiment.void_because(reason, true);
+            judged(done, again(experiment))
+        }
         _ => JobOutput::Answer(change(experiment, request).map_err(|refusal| refusal.to_string())),
     };
     let effects = side_effects(experiment, request, &before);
