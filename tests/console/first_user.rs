@@ -320,7 +320,7 @@ fn the_empty_queue_says_where_its_key_works() {
         &["Q queues the values of the proposal; in the form of o those of the form."],
     );
     console.press(&["Esc"]);
-    assert!(matches!(console.requests(&["Q"])[..], [OperatorRequest::Enqueue(_)]));
+    assert!(matches!(console.requests(&["Q", "y"])[..], [OperatorRequest::Enqueue(_)]));
 }
 
 /// Regression: "there is no trial yet" stood below a heading that named trial #0.

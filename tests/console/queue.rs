@@ -284,6 +284,8 @@ fn the_proposal_follows_the_queue_and_stop_works_over_it() {
 fn a_point_that_is_queued_twice_is_said_to_be() {
     let (_folder, mut session) = Session::opened((80, 24), &["--seed", "3", "--sampler", "random"]);
     session.send("Q");
+    session.wait_for(&["Queue the sampler's values?"]);
+    session.send("y");
     session.wait_for(&["Trial #0 (queued)"]);
     session.send("Q");
     session.wait_for(&["Queue it once more?", "remains the proposal"]);

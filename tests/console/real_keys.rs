@@ -69,7 +69,7 @@ const LIVE: &[Row] = &[
     row(Action::Fix, "X", Shows("Fix Fx at"), ("3\r", "fixed at")),
     row(Action::Fix, "X", Hides("fixed at"), ("", "")),
     row(Action::Bounds, "B", Shows("Search Fx from .. to"), ("\x1520..120\r", "initial 0.000..150.0")),
-    row(Action::QueuePoint, "Q", Shows("queue f0 ="), ("1", "8 s sweep")),
+    row(Action::QueuePoint, "Q", Shows("Queue the sampler's values?"), ("y1", "8 s sweep")),
     row(Action::Queue, "N", Shows("Left Right move it"), ("\r", "8 s sweep")),
     row(Action::Interrupt, "Ctrl-C", Shows("Ctrl-C again within 2 s quits"), ("", "DAMPED")),
     row(Action::Quit, "q", Shows("The study and its recording are in"), ("", "")),

@@ -167,7 +167,18 @@ fn an_override_outside_narrowed_bounds_is_refused_with_the_present_ones() {
 fn the_point_on_the_card_or_in_the_form_can_be_queued() {
     let point = |fx: f64| OperatorRequest::Enqueue(vec![("f0".into(), 1.25), ("Fx".into(), fx), ("Fz".into(), 250.0)]);
     let mut console = overriding();
-    assert_eq!(console.requests(&["Q"]), [point(75.0)]);
+    // Regression: the sampler's own values ran twice without a question.
+    assert_eq!(console.requests(&["Q"]), []);
+    for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let words = screen.split(|c: char| c.is_whitespace() || c == '│').filter(|word| !word.is_empty());
+        let words = words.collect::<Vec<_>>().join(" ");
+        assert!(
+            words.contains("it may propose them again after that; as long as it draws at random, it does."),
+            "{screen}"
+        );
+    }
+    assert_eq!(console.requests(&["y"]), [point(75.0)]);
     let sent = console.requests(&["o", "1", "0", "0", "Q"]);
     assert_eq!(sent, [point(100.0)], "as typed; the card stays as it is");
     assert!(console.model.dialog.is_none());

@@ -103,7 +103,7 @@ pub enum Question {
     Skip { trial: u32, revision: u32 },
     /// Accept a trial, or judge it a fall, whose suggested verdict is another.
     JudgeAnyway { trial: u32, verdict: Verdict },
-    /// Queue the values of the open proposal once more: it is queued itself.
+    /// Queue the values of the open proposal, which is queued itself or the sampler's, unchanged: they may run twice.
     QueueProposed { trial: u32 },
     /// Remove a point from the queue.
     RemoveQueued { trial: u32 },

@@ -1,5 +1,6 @@
 //! The session as its records have reported it.
 
+use quadfrog::optimize::repeats::LEAST_REPEATS;
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
@@ -242,16 +243,13 @@ impl SessionModel {
     pub fn confirmation(&self) -> Option<String> {
         let point = self.leading_point().filter(|_| self.confirming().is_none())?;
         let spread = point.deviation.map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
+        // The deviation of equal values is that of the rounding of their mean.
+        let is_known_equal = |point: &PointRecord| {
+            point.trials.len() >= LEAST_REPEATS && point.deviation.is_some_and(|deviation| deviation < 1e-9)
+        };
         let sure = match point.confidence {
             Some(confidence) => format!("with {:.1} % confidence", 100.0 * confidence),
-            // The deviation of equal values is that of the rounding of their mean.
-            None if self
-                .trials
-                .points
-                .iter()
-                .filter(|point| point.contender)
-                .all(|p| p.deviation.is_some_and(|d| d < 1e-9)) =>
-            {
+            None if self.trials.points.iter().filter(|point| point.contender).all(is_known_equal) => {
                 "without a confidence, because equal jumps give equal values here".to_owned()
             }
             None => "without a confidence".to_owned(),

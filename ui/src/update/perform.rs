@@ -6,7 +6,7 @@ use quadfrog::recording::record::LogLevel;
 use quadfrog::session::objective;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, Proposal, Verdict, six_digits};
+use quadfrog::trial::{ExperimentStage, Proposal, ProposalSource, Verdict, six_digits};
 use strum::VariantArray;
 
 use super::beside;
@@ -73,8 +73,9 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::QueuePoint => {
             let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
             let (trial, point) = (proposal.trial, queued_values(proposal));
-            // The sampler's proposal stays and is queued then; a queued point would run twice.
-            match model.session.queue().iter().any(|queued| queued.trial == trial) {
+            // A queued point would run twice, and the sampler's while it draws at random: the queued trial uses up no draw.
+            let is_queued = model.session.queue().iter().any(|queued| queued.trial == trial);
+            match is_queued || proposal.source == ProposalSource::Sampler {
                 true => open(model, Dialog::Confirm(Question::QueueProposed { trial })),
                 false => return request(model, OperatorRequest::Enqueue(point)),
             }

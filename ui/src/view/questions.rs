@@ -200,14 +200,21 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             (title, lines)
         }
         Question::QueueProposed { trial } => {
-            let lines = vec![
-                Line::from(format!(
-                    "Trial #{trial} is queued itself and remains the proposal: its values will run once more after it."
-                )),
-                Line::default(),
-                answers(&model.theme, "y", "queue"),
-            ];
-            ("Queue it once more?", lines)
+            let (title, text) = match model.session.queue().iter().any(|queued| queued.trial == *trial) {
+                true => (
+                    "Queue it once more?",
+                    format!(
+                        "Trial #{trial} is queued itself and remains the proposal: its values will run once more after it."
+                    ),
+                ),
+                false => (
+                    "Queue the sampler's values?",
+                    "They are proposed already, by the sampler. Queued, they run first, and it may propose them again after that; \
+                     as long as it draws at random, it does."
+                        .to_owned(),
+                ),
+            };
+            (title, vec![Line::from(text), Line::default(), answers(&model.theme, "y", "queue")])
         }
         Question::RemoveQueued { trial } => {
             let proposed = model.session.open_proposal().is_some_and(|proposal| proposal.trial == *trial);
