@@ -259,6 +259,13 @@ fn job_of_a_shell(folder: &Path) -> (Session, Pid) {
     (session, Pid::from_raw(console))
 }
 
+/// Ends the shell once it has the terminal again: what is typed before that is for the console, which drops it.
+fn end_shell(session: &mut Session) {
+    session.wait_until("the prompt", || session.screen().trim_end().ends_with("shell>"));
+    session.send("exit\r");
+    session.wait();
+}
+
 /// Regression: the shell had given the terminal its own mode, and STOP arrived with the next Enter.
 #[test]
 fn stop_works_after_a_shell_had_the_terminal() {
@@ -285,8 +292,7 @@ fn stop_works_after_a_shell_had_the_terminal() {
     session.wait_until("the help is closed", || !session.screen().contains("Keys"));
     session.send("q");
     session.wait_for(&["The study and its recording are in", "shell>"]);
-    session.send("exit\r");
-    session.wait();
+    end_shell(&mut session);
 }
 
 /// A console in the background neither reads nor draws, is not stopped for it, and does not count as a present operator.
@@ -307,8 +313,7 @@ fn a_console_in_the_background_runs_on_and_its_robot_sits_down() {
     session.wait_for(&["STOP  Space F12", "Press A to arm"]);
     session.send("q");
     session.wait_for(&["The study and its recording are in"]);
-    session.send("exit\r");
-    session.wait();
+    end_shell(&mut session);
     assert!(entered(&player(folder.path()), Mode::SitDown) > 0.0);
 }
 
