@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{Config, ConfigError, write_new_files};
-use crate::trial::Task;
+use crate::trial::{ParameterInfo, Task};
 
 impl Config {
     /// Writes the files of this configuration into `folder`: a new study of `task` begins with `point` (`[first.<task>]` in
     /// `optimize.toml`), and its trials run with `gains`, both by name. A gain that is a parameter of `task` is part of the point
-    /// only. Returns the written files.
+    /// only. `searched`: the parameters with the bounds of the study that has found the point; they replace those of this
+    /// configuration, and hold the point. Returns the written files.
     ///
     /// # Errors
     /// As of [`write_new_files`]: nothing is overwritten.
@@ -20,11 +21,18 @@ impl Config {
         task: Task,
         point: &[(String, f64)],
         gains: &[(String, f64)],
+        searched: &[ParameterInfo],
     ) -> Result<Vec<PathBuf>, ConfigError> {
+        let number = |(name, value): &(String, f64)| (name.clone(), Value::Float(*value));
+        let bounds: Vec<_> =
+            self.parameters(task).iter().filter_map(|own| changed_bounds(own, searched, point)).collect();
         let gains: Vec<_> = gains.iter().filter(|(name, _)| !self.optimizes(task, name)).cloned().collect();
         let changed = |(name, text): &(String, String)| match name.as_str() {
-            "optimize.toml" => with(text, &["first", task.name()], point),
-            "control.toml" => with(text, &["tasks", task.name()], &gains),
+            "optimize.toml" => {
+                let first = with(text, &["first", task.name()], point.iter().map(number).collect());
+                with(&first, &["bounds"], bounds.clone())
+            }
+            "control.toml" => with(text, &["tasks", task.name()], gains.iter().map(number).collect()),
             _ => text.clone(),
         };
         let files: Vec<_> = self.as_run.iter().map(|file| (&file.0, changed(file))).collect();
@@ -32,8 +40,20 @@ impl Config {
     }
 }
 
-/// Returns the text of a file with numbers set in one of its tables, created if missing.
-fn with(text: &str, tables: &[&str], values: &[(String, f64)]) -> String {
+/// Returns the bounds of the parameter `own` in `searched`, wide enough for `point`; none where its own are those.
+fn changed_bounds(own: &ParameterInfo, searched: &[ParameterInfo], point: &[(String, f64)]) -> Option<(String, Value)> {
+    let bounds = searched.iter().find(|p| p.name == own.name).unwrap_or(own);
+    let value = point.iter().find(|(name, _)| *name == own.name).map_or(bounds.low, |(_, value)| *value);
+    let (low, high) = (bounds.low.min(value), bounds.high.max(value));
+    ((low, high) != (own.low, own.high))
+        .then(|| (own.name.clone(), Value::Array(vec![Value::Float(low), Value::Float(high)])))
+}
+
+/// Returns the text of a file with values set in one of its tables, created if missing.
+fn with(text: &str, tables: &[&str], values: Vec<(String, Value)>) -> String {
+    if values.is_empty() {
+        return text.to_owned();
+    }
     let Ok(mut whole) = text.parse::<Table>() else { return text.to_owned() };
     let mut table = &mut whole;
     for name in tables {
@@ -43,8 +63,6 @@ fn with(text: &str, tables: &[&str], values: &[(String, f64)]) -> String {
             _ => return text.to_owned(),
         }
     }
-    for (name, value) in values {
-        table.insert(name.clone(), Value::Float(*value));
-    }
-    if values.is_empty() { text.to_owned() } else { whole.to_string() }
+    table.extend(values);
+    whole.to_string()
 }

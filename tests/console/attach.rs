@@ -184,6 +184,12 @@ fn a_pause_of_an_observer_looks_old_and_ends_at_the_present() {
     assert!(!watcher.screen().contains("FOLLOWING"), "{}", watcher.screen());
     watcher.send("p");
     watcher.wait_for(&["FOLLOWING", "about 1 s behind"]);
+    // Regression: the key that the line names showed the present once, paused, and it became old again.
+    watcher.send("p");
+    watcher.wait_for(&["OLD: ", ") shows the present"]);
+    watcher.send(")");
+    watcher.wait_for(&["FOLLOWING", "about 1 s behind"]);
+    assert!(!watcher.screen().contains("paused"), "{}", watcher.screen());
     session.send("A");
     watcher.wait_for(&["READY"]);
     watcher.send("q");

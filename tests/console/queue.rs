@@ -229,6 +229,14 @@ fn changed_gains_of_the_best_trial_are_shown_with_it() {
         report.contains("Best trial of forward, seed 3, other gains: kp 600 (newest configuration: 400)."),
         "{report}"
     );
+    // Regression: the runs of the best trial had the configured gains, without a word.
+    let evaluated = quadfrog(folder.path(), &["evaluate", "--config", study, "--point", "best", "--json"]);
+    let run: serde_json::Value = serde_json::from_str(&text(&evaluated)).expect("one run");
+    let said = String::from_utf8_lossy(&evaluated.stderr).into_owned();
+    assert!(said.contains("trial 0 ran with other gains: kp 600 (configured 400): so do these runs"), "{said}");
+    let usual = ["evaluate", "--config", study, "--point", &best_point(study, folder.path()), "--json"];
+    let usual: serde_json::Value = serde_json::from_str(&text(&quadfrog(folder.path(), &usual))).expect("one run");
+    assert_ne!(run["value"], usual["value"]);
     // The note has the configuration with which the trial ran; the comparison that with which the study runs now.
     std::fs::create_dir(folder.path().join("other")).expect("a folder");
     std::fs::write(folder.path().join("other/control.toml"), "[tasks.forward]\nkp = 500.0\n").expect("a configuration");
@@ -238,6 +246,15 @@ fn changed_gains_of_the_best_trial_are_shown_with_it() {
     let shown = text(&quadfrog(folder.path(), &["study", "show", study]));
     assert!(shown.contains("other gains: kp 600 (newest configuration: 500)"), "{shown}");
     assert!(shown.contains("other gains: kp 600 (configured 400)"), "{shown}");
+}
+
+/// The parameters of the only trial of a study, as `--point` takes them.
+fn best_point(study: &str, folder: &Path) -> String {
+    let table: serde_json::Value =
+        serde_json::from_str(&text(&quadfrog(folder, &["study", "export", study, "--format", "json"])))
+            .expect("a table");
+    let row = if table.is_array() { &table[0] } else { &table };
+    ["f0", "Fx", "Fz"].map(|name| format!("{name}={}", row[format!("params_{name}")])).join(",")
 }
 
 /// The first point of the queue is the proposal: when it is moved or removed, the next one is proposed, and STOP works over the list.

@@ -527,6 +527,13 @@ fn the_best_is_written_as_a_configuration_that_the_program_takes() {
     assert_eq!(std::fs::read_to_string(best.join("optimize.toml")).expect("the first one"), kept, "nothing is lost");
     let table = export::table(&console.model, ExportedRows::All).expect("written");
     assert_eq!(std::fs::read_to_string(table).expect("the table").lines().count(), 5);
+    // Regression: after a change of the bounds the written point was outside the written bounds.
+    for (bounds, written) in [((0.0, 180.0), [0.0, 180.0]), ((90.0, 120.0), [75.0, 120.0])] {
+        console.record(Record::Search(search(bounds, None)));
+        let config = Config::load(Some(&export::best(&console.model).expect("written"))).expect("a configuration");
+        let fx = config.parameters(Task::Forward).into_iter().find(|p| p.name == "Fx").expect("it");
+        assert_eq!([fx.low, fx.high], written);
+    }
     // A folder that cannot be written is named.
     console.record(Record::Session(SessionInfo { study: "/proc/study.log".into(), ..session() }));
     let error = export::best(&console.model).expect_err("no such place").to_string();

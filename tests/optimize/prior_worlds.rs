@@ -213,7 +213,7 @@ fn the_kept_configuration_has_the_settings_of_the_prior() {
     let (default, small) = (layered(&[]).unwrap(), layered(&[("prior.toml", SMALL)]).unwrap());
     assert_ne!(fingerprint(&default, &go1()), fingerprint(&small, &go1()));
     let folder = tempfile::tempdir().unwrap();
-    let written: Vec<PathBuf> = small.export(folder.path(), Task::Forward, &[], &[]).unwrap();
+    let written: Vec<PathBuf> = small.export(folder.path(), Task::Forward, &[], &[], &[]).unwrap();
     assert!(written.contains(&folder.path().join("prior.toml")));
     assert_eq!(Config::load(Some(folder.path())).unwrap().prior, small.prior);
     std::fs::remove_file(folder.path().join(Path::new("prior.toml"))).unwrap();

@@ -157,9 +157,15 @@ fn the_page_counts_overrides_and_reruns_that_ran() {
         row(2, ProposalSource::Rerun, ""),
         row(3, ProposalSource::Rerun, ""),
         row(4, ProposalSource::Sampler, ""),
+        // Regression: one whose values were queued from the form of overrides was listed and not counted.
+        TrialRecord {
+            gains: vec![("kp".to_owned(), 310.0)].into(),
+            proposed: vec![("kp".to_owned(), 400.0)].into(),
+            ..row(5, ProposalSource::Queued, "")
+        },
     ];
     let shown = text::render(&study_page::summary(&study(0, rows)), 80);
-    assert!(shown.contains("1 trial with values that an operator has set, 2 re-runs."), "{shown}");
+    assert!(shown.contains("2 trials with values that an operator has set, 2 re-runs."), "{shown}");
     let shown = text::render(&study_page::summary(&study(0, vec![row(0, ProposalSource::Sampler, "")])), 80);
     assert!(!shown.contains("re-run"), "{shown}");
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
+use quadfrog::trial::ParameterInfo;
 
 use crate::message::ExportedRows;
 use crate::model::Model;
@@ -32,7 +33,7 @@ pub fn table(model: &Model, rows: ExportedRows) -> anyhow::Result<PathBuf> {
     Ok(csv)
 }
 
-/// Writes the newest configuration of the study with its best point and the gains of that trial, as a folder
+/// Writes the newest configuration of the study with its best point, the gains of that trial and the bounds of the search, as a folder
 /// `best-trial-<number>` for `quadfrog --config`, `best-trial-<number>-2` where that exists. Returns the folder; nothing is
 /// overwritten.
 ///
@@ -49,6 +50,11 @@ pub fn best(model: &Model) -> anyhow::Result<PathBuf> {
     let free = names.map(|name| study.join(name)).find(|folder| !folder.exists());
     let folder =
         free.with_context(|| format!("{}: no name is free for another export", study.join(&name).display()))?;
-    config.export(&folder, task, &best.parameters, &best.gains)?;
+    let session = &model.session;
+    let searched = session.info.parameters.iter().map(|p| match session.searched(&p.name) {
+        Some(now) => ParameterInfo { low: now.low, high: now.high, ..p.clone() },
+        None => p.clone(),
+    });
+    config.export(&folder, task, &best.parameters, &best.gains, &searched.collect::<Vec<_>>())?;
     Ok(folder)
 }

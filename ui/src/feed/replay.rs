@@ -199,6 +199,8 @@ impl ReplayFeed {
     fn go_to_end(&mut self) {
         self.go_to(self.recording.duration_ns());
         self.at_present = self.follow_in_ns.is_some();
+        // What is watched goes on.
+        self.playing |= self.at_present;
     }
 
     /// Goes to a place; without one the replay stays where it is and reports that there is none.

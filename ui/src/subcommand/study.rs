@@ -458,7 +458,7 @@ fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> 
         return Err(Failure::input(format!("{}: no accepted trial of this program to export", selector.place)));
     };
     let config = selector.config()?;
-    config.export(folder, ours.task, &best.parameters, &best.gains)?;
+    config.export(folder, ours.task, &best.parameters, &best.gains, &opened.parameters)?;
     let (text, task, folder) = (best_line(&config, &opened, &rows), ours.task.name(), folder.display());
     output::text(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"));
     Ok(())

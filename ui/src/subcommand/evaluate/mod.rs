@@ -7,7 +7,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::output;
+use crate::{notice, output};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,7 +19,7 @@ use quadfrog::session::evaluation::{EvaluatedRun, evaluate};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
+use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task, other_gains};
 use serde_json::json;
 
 use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds, whole_number};
@@ -90,9 +90,9 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let source = Source::open(arguments)?;
     let Source { config, robot, task, .. } = &source;
     let control = config.task(*task);
-    let point = point(arguments, &source)?;
+    let (point, gains) = point(arguments, &source)?;
     let jump = JumpParameters::from_values(&point, control.f1_hz);
-    let mut spec = TrialSpec { gains: control.gains().with(&point), ..control.trial(*task, jump) };
+    let mut spec = TrialSpec { gains: control.gains().with(&gains).with(&point), ..control.trial(*task, jump) };
     if let Some(duration_s) = arguments.duration {
         if jump.f1_hz <= 0.0 {
             let message = "--duration: jumps in a row need f1, the frequency between impulses; give it in --point or control.toml";
@@ -234,8 +234,9 @@ impl Drop for Progress {
     }
 }
 
-/// Returns the point of the arguments, else that of the configuration; parameters that the task does not optimize may be given.
-fn point(arguments: &EvaluateArguments, source: &Source) -> Result<ParameterValues, Failure> {
+/// Returns the point of the arguments, else that of the configuration, and the gains with which it ran as the best trial of a study;
+/// parameters that the task does not optimize may be given.
+fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterValues, ParameterValues), Failure> {
     let Source { config, task, .. } = source;
     match arguments.point.as_deref() {
         Some("best") => best(source),
@@ -263,7 +264,7 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<ParameterValu
             if !values.iter().any(|(name, _)| name == "f0") {
                 return Err(Failure::input(format!("--point {text}: f0 is missing, the frequency of the impulse")));
             }
-            Ok(values.into())
+            Ok((values.into(), ParameterValues::default()))
         }
         None => {
             let first = config.first(*task);
@@ -274,13 +275,13 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<ParameterValu
                 );
                 return Err(Failure::input(message));
             }
-            Ok(first)
+            Ok((first, ParameterValues::default()))
         }
     }
 }
 
-/// Returns the parameters of the best trial of the study.
-fn best(source: &Source) -> Result<ParameterValues, Failure> {
+/// Returns the parameters and the gains of the best trial of the study. Says which gains are not those of the configuration.
+fn best(source: &Source) -> Result<(ParameterValues, ParameterValues), Failure> {
     let Source { config, task, study, .. } = source;
     let Some(file) = study else {
         let message = "--point best: there is no study in or above the folder of --config; give --config STUDY";
@@ -296,7 +297,12 @@ fn best(source: &Source) -> Result<ParameterValues, Failure> {
     let best = opened
         .best(&rows)
         .ok_or_else(|| Failure::input(format!("--point best: {} has no trial that landed", file.display())))?;
-    Ok(best.parameters.clone())
+    let configured = config.task(*task).gains().values();
+    let others = other_gains(&best.gains, ("configured", &configured), |name| config.optimizes(*task, name));
+    if !others.is_empty() {
+        notice!("trial {} ran with {others}: so do these runs", best.trial);
+    }
+    Ok((best.parameters.clone(), best.gains.clone()))
 }
 
 /// Returns one run as a line of JSON; `friction` is that of the ground.
