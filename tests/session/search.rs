@@ -371,7 +371,7 @@ fn equal_repeats_give_no_confidence() {
     }
     let words = news.log.iter().find(|line| line.starts_with("confirmed")).expect("it is said");
     assert!(words.contains("leads without a confidence, because equal jumps give equal values here"), "{words}");
-    // Regression: a reader was told of repeats to come, as long as the last verdict could be taken back.
+    // Regression: the words for a reader named repeats to come, as long as the last verdict could be taken back.
     let read = study_in(folder.path());
     let in_words = confirmation_in_words(&judged(&read).unwrap(), 0.95).expect("a confirmation");
     assert!(words.ends_with(&in_words), "{in_words}");

@@ -192,6 +192,11 @@ impl SessionModel {
         self.search.as_ref().map_or(&[], |search| &search.queue)
     }
 
+    /// Whether a trial is in the queue.
+    pub fn is_queued(&self, trial: u32) -> bool {
+        self.queue().iter().any(|point| point.trial == trial)
+    }
+
     /// A parameter with the range that panels over it show: the study's own bounds, so that past trials stay where they were when
     /// the search is narrowed, as far as the present bounds, a trial or the proposal do not lie outside of them.
     pub fn with_shown_range(&self, info: &ParameterInfo) -> ParameterInfo {

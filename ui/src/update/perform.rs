@@ -74,8 +74,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
             let (trial, point) = (proposal.trial, queued_values(proposal));
             // A queued point would run twice, and the sampler's while it draws at random: the queued trial uses up no draw.
-            let is_queued = model.session.queue().iter().any(|queued| queued.trial == trial);
-            match is_queued || proposal.source == ProposalSource::Sampler {
+            match model.session.is_queued(trial) || proposal.source == ProposalSource::Sampler {
                 true => open(model, Dialog::Confirm(Question::QueueProposed { trial })),
                 false => return request(model, OperatorRequest::Enqueue(point)),
             }

@@ -39,9 +39,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         Some(Dialog::Confirm(Question::QueueProposed { trial })) => {
             model.session.open_proposal().is_none_or(|proposal| proposal.trial != *trial)
         }
-        Some(Dialog::Confirm(Question::RemoveQueued { trial })) => {
-            model.session.queue().iter().all(|point| point.trial != *trial)
-        }
+        Some(Dialog::Confirm(Question::RemoveQueued { trial })) => !model.session.is_queued(*trial),
         Some(Dialog::Confirm(Question::EndRepeats)) => {
             model.session.confirming().is_none() || legal(Action::ConfirmBest, model).is_err()
         }

@@ -200,7 +200,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             (title, lines)
         }
         Question::QueueProposed { trial } => {
-            let (title, text) = match model.session.queue().iter().any(|queued| queued.trial == *trial) {
+            let (title, text) = match model.session.is_queued(*trial) {
                 true => (
                     "Queue it once more?",
                     format!(
