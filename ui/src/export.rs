@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow};
 use quadfrog::config::Config;
 use quadfrog::engine::newest_config;
-use quadfrog::trial::ParameterInfo;
 
 use crate::message::ExportedRows;
 use crate::model::Model;
@@ -51,10 +50,7 @@ pub fn best(model: &Model) -> anyhow::Result<PathBuf> {
     let folder =
         free.with_context(|| format!("{}: no name is free for another export", study.join(&name).display()))?;
     let session = &model.session;
-    let searched = session.info.parameters.iter().map(|p| match session.searched(&p.name) {
-        Some(now) => ParameterInfo { low: now.low, high: now.high, ..p.clone() },
-        None => p.clone(),
-    });
-    config.export(&folder, task, &best.parameters, &best.gains, &searched.collect::<Vec<_>>())?;
+    let searched: Vec<_> = session.info.parameters.iter().filter_map(|p| session.parameter(&p.name)).collect();
+    config.export(&folder, task, &best.parameters, &best.gains, &searched)?;
     Ok(folder)
 }
