@@ -273,8 +273,8 @@ fn queued_points_have_the_digits_and_units_of_the_card() {
 #[test]
 fn the_falls_near_a_proposal_are_named_in_their_number() {
     for (falls, neighbours, text) in [
-        (0, 1, "the nearest trial stood"),
-        (1, 1, "the nearest trial fell"),
+        (0, 1, "the only judged trial stood"),
+        (1, 1, "the only judged trial fell"),
         (0, 5, "none of the 5 nearest trials fell"),
         (2, 5, "2 of the 5 nearest trials fell"),
         (5, 5, "all 5 nearest trials fell"),

@@ -113,7 +113,21 @@ fn assert_panel(session: &Session, [a, b]: [&TrialRecord; 2]) {
     for (name, _) in a.parameters.iter() {
         cells(&format!("{name} "), [a, b].map(|row| number(row.parameters.get(name).unwrap())));
     }
-    cells("dx m", [a, b].map(|row| format!("{:+.3}", row.measured.as_ref().unwrap().dx_m)));
+    // Regression: at 80x24 the causes took the place of rise and time in the air.
+    for label in ["dx m", "dy m", "yaw rad", "rise m", "air s"] {
+        let measured = |row: &TrialRecord| {
+            let m = row.measured.as_ref().unwrap();
+            match label {
+                "dx m" => m.dx_m,
+                "dy m" => m.dy_m,
+                "yaw rad" => m.dyaw_rad,
+                "rise m" => m.apex_m,
+                _ => m.air_s,
+            }
+        };
+        cells(label, [a, b].map(|row| format!("{:+.3}", measured(row))));
+    }
+    of_panel(session, &format!("A: {}", a.cause.split(' ').next().unwrap()));
 }
 
 #[test]

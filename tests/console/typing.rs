@@ -337,6 +337,21 @@ fn enter_is_not_said_to_confirm_before_a_refused_character_is_acknowledged() {
     assert_shows(&last(&mut console), &["Enter confirms, Esc cancels. Space is STOP."]);
 }
 
+/// Regression: in an empty field that needs a number the last line said that Enter confirms.
+#[test]
+fn an_empty_field_says_what_to_type() {
+    let mut console = Console::review(Mode::Review, Verdict::Accept);
+    let last = |console: &Console| console.screen(80, 24).lines().last().unwrap_or_default().to_owned();
+    console.press(&["2", "/"]);
+    assert_shows(&last(&console), &["Type the number of a trial, Esc cancels."]);
+    console.press(&["z"]);
+    assert_shows(&last(&console), &["Type the number of a trial, Esc cancels."]);
+    console.enter("0");
+    assert_shows(&last(&console), &["Enter twice confirms, Esc cancels."]);
+    console.press(&["Enter"]);
+    assert_shows(&last(&console), &["Enter confirms, Esc cancels."]);
+}
+
 /// Regression: over a half-written note, which a STOP keeps open, the line advised the key that drops it.
 #[test]
 fn a_form_that_is_open_over_a_stop_says_first_how_it_is_kept() {
@@ -356,7 +371,7 @@ fn a_form_that_is_open_over_a_stop_says_first_how_it_is_kept() {
     for (keys, step) in [
         (&["=", "1"][..], "FAULT: Enter uses the value, Esc drops it; then k acknowledges."),
         (&["=", "1", "m"], "FAULT: Enter twice confirms, Esc cancels; then k acknowledges."),
-        (&["2", "/"], "FAULT: Enter confirms, Esc cancels; then k acknowledges."),
+        (&["2", "/"], "FAULT: Esc cancels; then k acknowledges."),
     ] {
         let mut console = Console::review(Mode::Review, Verdict::Accept);
         console.press(keys);

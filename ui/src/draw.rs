@@ -46,8 +46,8 @@ pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside:
 /// The falls among the nearest judged trials, in words: `2 of the 5 nearest trials fell`.
 pub fn falls_near(risk: &FallRisk) -> String {
     match (risk.falls, risk.neighbours) {
-        (0, 1) => "the nearest trial stood".to_owned(),
-        (_, 1) => "the nearest trial fell".to_owned(),
+        (0, 1) => "the only judged trial stood".to_owned(),
+        (_, 1) => "the only judged trial fell".to_owned(),
         (0, of) => format!("none of the {of} nearest trials fell"),
         (falls, of) if falls == of => format!("all {of} nearest trials fell"),
         (falls, of) => format!("{falls} of the {of} nearest trials fell"),

@@ -245,6 +245,11 @@ impl Dialog {
         }
     }
 
+    /// Whether it is an empty field that needs a content.
+    pub fn lacks_content(&self) -> bool {
+        matches!(self, Dialog::Field { purpose, input, .. } if purpose.needed().is_some() && input.value().trim().is_empty())
+    }
+
     /// Whether a space is text here: not where a number is typed, and in a place of a recording unless Space stops a robot.
     pub fn takes_spaces(&self, can_stop: bool) -> bool {
         match self {

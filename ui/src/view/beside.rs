@@ -6,14 +6,14 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, number, sign, span};
 use crate::column::Column;
+use crate::draw::{heading, number, sign, span, truncate};
 use crate::message::ComparedTrial;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
 use crate::model::trials::measured;
-use crate::theme::Role;
-use crate::wrap::wrap_all;
+use crate::theme::{Role, Theme};
+use crate::wrap::wrap;
 
 /// Measured values with their labels.
 const MEASURED: [(Column, &str); 5] = [
@@ -23,14 +23,15 @@ const MEASURED: [(Column, &str); 5] = [
     (Column::Rise, "rise m"),
     (Column::Air, "air s"),
 ];
-/// Heading, numbers, value, verdict, measured values, and two lines for each cause.
-const FIXED_ROWS: usize = 4 + MEASURED.len() + 4;
+/// Heading, numbers, value, verdict, measured values.
+const FIXED_ROWS: usize = 4 + MEASURED.len();
 const LABEL: usize = 8;
 
-/// Rows that the panel fills.
-pub fn rows(comparison: &Comparison) -> u16 {
+/// Rows that the panel needs, with a line for each cause, and those that it fills, with two.
+pub fn rows(comparison: &Comparison) -> [u16; 2] {
     let recording = usize::from(comparison.b.recording.is_some());
-    (FIXED_ROWS + recording + parameters(comparison).len()) as u16
+    let values = FIXED_ROWS + recording + parameters(comparison).len();
+    [values + 2, values + 4].map(|rows| rows as u16)
 }
 
 /// Names of the parameters of A, then the further ones of B.
@@ -86,19 +87,40 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         let unit = model.session.parameter(name).map_or(String::new(), |info| info.unit);
         lines.push(line(&format!("{name} {unit}"), both(&|_, row| value(row.parameters.get(name)))));
     }
-    let cause = |(name, trial): (&str, &ComparedTrial)| {
-        let cause = trial.row.as_ref().map(|row| row.cause.clone()).filter(|cause| !cause.is_empty())?;
-        Some(Line::from(span(theme, Role::Quiet, format!(" {name}: {cause}"))))
-    };
-    let causes: Vec<Line> = [("A", a), ("B", b)].into_iter().filter_map(cause).collect();
-    let causes = wrap_all(&causes, usize::from(body.width), 4);
-    // In a low panel measured values give way to the causes of both verdicts.
-    let room = usize::from(body.height).saturating_sub(lines.len() + causes.len());
-    for (column, label) in MEASURED.into_iter().take(room) {
+    for (column, label) in MEASURED {
         lines.push(line(label, both(&|_, row| signed(measured(row, column)))));
     }
-    lines.extend(causes);
+    let rows_of_values = lines.len();
+    let room = usize::from(body.height).saturating_sub(rows_of_values);
+    lines.extend(causes(comparison, theme, usize::from(body.width), room));
+    if rows_of_values > usize::from(body.height) {
+        lines.truncate(usize::from(body.height).saturating_sub(1));
+        let left_out = rows_of_values - lines.len();
+        lines.push(Line::from(span(theme, Role::Quiet, format!(" {left_out} more have no room"))));
+    }
     frame.render_widget(Paragraph::new(lines), body);
+}
+
+/// The causes of both verdicts in at most `room` lines: of one that is longer than its share the first line, with a sign at its end.
+fn causes(comparison: &Comparison, theme: &Theme, width: usize, room: usize) -> Vec<Line<'static>> {
+    let cause = |(name, trial): (&str, &ComparedTrial)| {
+        let cause = trial.row.as_ref().map(|row| row.cause.clone()).filter(|cause| !cause.is_empty())?;
+        let text = Line::from(span(theme, Role::Quiet, format!(" {name}: {cause}")));
+        Some((text.to_string(), wrap(&text, width, 4)))
+    };
+    let all: Vec<_> = [("A", &comparison.a), ("B", &comparison.b)].into_iter().filter_map(cause).collect();
+    let mut spare = room.saturating_sub(all.len());
+    let mut lines = Vec::new();
+    for (text, whole) in all.into_iter().take(room) {
+        match spare.checked_sub(whole.len() - 1) {
+            Some(left) => {
+                spare = left;
+                lines.extend(whole);
+            }
+            None => lines.push(Line::from(span(theme, Role::Quiet, truncate(&text, width)))),
+        }
+    }
+    lines
 }
 
 /// The verdict, or else the suggested one with a question mark.

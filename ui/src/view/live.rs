@@ -27,6 +27,8 @@ const LANDED_SIDE: u16 = 30;
 const WIDE: u16 = 120;
 /// Columns from which the whole table fits beside the trial.
 const ROOMY: u16 = 160;
+/// Rows of the table: heading and two trials, at least.
+const LEAST_TABLE_ROWS: u16 = 3;
 /// Rows of a chart with its heading, at least.
 const CHART_ROWS: u16 = 3;
 /// Rows of the charts from which the time axis has one of its own.
@@ -52,7 +54,9 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
     if area.width < WIDE && model.live.panel == Panel::Charts && model.landed().is_some() {
         return None;
     }
-    let table_rows = (area.height / 4).clamp(5, 14);
+    // In a low terminal the table gives rows to the two trials that are compared.
+    let most = compared(model).map_or(14, |comparison| area.height.saturating_sub(beside::rows(comparison)[0]));
+    let table_rows = (area.height / 4).clamp(5, 14).min(most.max(LEAST_TABLE_ROWS));
     let above_table = |area: Rect| Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
     let side_columns = if area.width >= WIDE { (SIDE + 10).max(area.width * 3 / 10) } else { SIDE };
     let beside = |area: Rect| {
@@ -70,7 +74,7 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
         (beside(upper), table)
     };
     let card_rows = match compared(model) {
-        Some(comparison) => beside::rows(comparison).min(side.height),
+        Some(comparison) => beside::rows(comparison)[1].min(side.height),
         None => card_rows(model, side.width).min(side.height.saturating_sub(5)),
     };
     let room = side.height - card_rows;

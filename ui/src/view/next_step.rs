@@ -351,6 +351,7 @@ fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
 /// The two ends of a form with values of the operator, the one that keeps them first; none of another dialog.
 fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
     Some(match dialog {
+        Dialog::Field { .. } if dialog.lacks_content() => "Esc cancels",
         _ if dialog.has_refused_character() => "Enter twice confirms, Esc cancels",
         Dialog::Override(_) => "Enter applies, Esc drops the values",
         Dialog::Field { purpose: Purpose::Note(_), .. } => "Enter keeps the note, Esc drops it",
@@ -428,8 +429,12 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
             "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
         }
         Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
-        Dialog::Field { .. } => {
-            let enter = if dialog.has_refused_character() { "Enter twice confirms" } else { "Enter confirms" };
+        Dialog::Field { purpose, .. } => {
+            let enter = match purpose.needed().filter(|_| dialog.lacks_content()) {
+                Some(needed) => format!("Type {needed}"),
+                None if dialog.has_refused_character() => "Enter twice confirms".to_owned(),
+                None => "Enter confirms".to_owned(),
+            };
             let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
             format!("{enter}, Esc cancels.{space}")
         }
