@@ -176,7 +176,7 @@ pub fn is_changed_verdict(cause: &str) -> bool {
 struct OperatorsWords<'a> {
     /// The operator's reason; empty without one.
     reason: &'a str,
-    /// `changed by the operator, was accept`, `by the operator, suggested was fall`, `re-run by the operator`.
+    /// `changed by the operator, was accept`, `by the operator, looked like fall`, `re-run by the operator`.
     act: String,
     /// The cause before.
     rest: &'a str,
@@ -200,7 +200,7 @@ impl OperatorsWords<'_> {
         let (words, act, rest) = match words.split_once("; looked like ") {
             Some((words, rest)) => {
                 let (suggested, rest) = rest.split_once(": ")?;
-                (words, format!("{by}, suggested was {suggested}"), rest)
+                (words, format!("{by}, looked like {suggested}"), rest)
             }
             None => words.split_once("; ").map(|(words, rest)| (words, by.to_owned(), rest))?,
         };

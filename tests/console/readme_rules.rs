@@ -251,11 +251,11 @@ fn the_details_of_a_trial_hold_the_proposed_value_of_an_override() {
 fn the_cause_of_the_operator_is_a_reason_and_a_sentence() {
     for (cause, reason, sentence) in [
         ("landed and settled", None, "landed and settled"),
-        ("by the operator; looked like fall: roll 1.2 rad", None, "by the operator, suggested was fall (roll 1.2 rad)"),
+        ("by the operator; looked like fall: roll 1.2 rad", None, "by the operator, looked like fall (roll 1.2 rad)"),
         (
             "re-run by the operator: a cable pulled; looked like fall: roll 1.2 rad",
             Some("a cable pulled"),
-            "re-run by the operator, suggested was fall (roll 1.2 rad)",
+            "re-run by the operator, looked like fall (roll 1.2 rad)",
         ),
         (
             "by the operator: a cable pulled; STOP was pressed",

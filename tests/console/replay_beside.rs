@@ -125,7 +125,8 @@ fn assert_panel(session: &Session, [a, b]: [&TrialRecord; 2]) {
                 _ => m.air_s,
             }
         };
-        cells(label, [a, b].map(|row| format!("{:+.3}", measured(row))));
+        let sign = |number: String| if label == "air s" { number.replace('+', "") } else { number };
+        cells(label, [a, b].map(|row| sign(format!("{:+.3}", measured(row)))));
     }
     of_panel(session, &format!("A: {}", a.cause.split(' ').next().unwrap()));
 }

@@ -230,7 +230,7 @@ fn densities_say_why_a_point_was_proposed_without_colours_too() {
         let why = line_with(&screen, "TPE ");
         assert_eq!(why.contains("(#12)"), columns > 80, "{why}");
         assert!(why.contains("importance 62 %"), "{why}");
-        assert_eq!(screen.contains("importance: for best tenth"), columns > 80, "{screen}");
+        assert!(screen.contains("importance: for best tenth"), "{screen}");
         assert!(why.contains("Fx") && why.contains("Fz"), "{why}");
         // Peak and proposal of the good trials are at a quarter of the panel, the peak of the rest at three quarters.
         let width = why.find("Fx").map(|_| usize::from(columns) / 3).expect("three panels");
@@ -388,13 +388,11 @@ fn the_signs_of_the_optimizer_are_explained_at_every_size() {
         assert_shows(&line_with(&console.screen(columns, rows), "o accept  x"), &signs);
         console.record(Record::Insight(insight()));
         console.record(Record::Trial(trial(4, None, Some(Verdict::Accept))));
-        let legend = line_with(&console.screen(columns, rows), "o accept  x");
-        assert_shows(&legend, &[&signs[..5], &["? not judged", "g good", "r rest"]].concat());
-        let last = legend.split("  ").last().unwrap_or_default();
-        assert!(
-            ["r rest", "─ best so far", "importance: for best tenth"].contains(&last.trim()),
-            "a sign is whole or left out: {legend}"
-        );
+        // Regression: at 80 columns the last signs had no room.
+        let screen = console.screen(columns, rows);
+        let legend: Vec<&str> = screen.lines().skip_while(|line| !line.contains("o accept  x")).collect();
+        let more = ["? not judged", "g good", "r rest", "importance: for best tenth"];
+        assert_shows(&legend[..2].join("  "), &[&signs[..], &more].concat());
     }
 }
 

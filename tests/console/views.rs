@@ -256,6 +256,34 @@ fn two_trials_at_80_columns_have_whole_numbers_and_both_causes() {
     assert_shows(&replayed, &["Two trials", "A: cause 0", "B: cause 2"]);
 }
 
+/// Regression: beside another trial a void one had the value that was measured, and the charts of the feet the contact of A alone.
+#[test]
+fn a_void_trial_has_no_value_beside_another_one() {
+    let mut console = jumped(&[0, 1, 2]);
+    let mut void = trial(0, Some(Verdict::Void), Some(Verdict::Accept));
+    void.measured.as_mut().unwrap().dy_m = -0.0004;
+    let waiting = trial(2, None, Some(Verdict::Accept));
+    for row in [void, trial(1, Some(Verdict::Accept), None), waiting] {
+        console.record(Record::Trial(row));
+    }
+    console.update(Msg::Replay(ReplayStatus::default()));
+    let cells = |console: &Console, label: &str| {
+        let screen = console.screen(120, 40);
+        let line = screen.lines().skip(3).find_map(|line| line.split_once(&format!(" {label} "))).expect(label);
+        line.1.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>()
+    };
+    console.press(&["2", "Home", "c", "Down", "c", "1"]);
+    assert_eq!(cells(&console, "J m"), ["-", "0.410"]);
+    assert_eq!(cells(&console, "dx m"), ["+0.420", "+0.420"]);
+    assert_eq!(cells(&console, "dy m"), ["+0.000", "-0.010"]);
+    assert_eq!(cells(&console, "air s"), ["0.250", "0.250"]);
+    let heading = line_with(&console.screen(120, 40), "FR foot z");
+    assert!(!heading.contains(['●', '○']), "{heading}");
+    // A trial that waits for its verdict has what was measured.
+    console.press(&["Esc", "2", "Home", "Down", "c", "End", "c", "1"]);
+    assert_eq!(cells(&console, "J m"), ["0.410", "0.420"]);
+}
+
 #[test]
 fn a_trial_without_a_trace_cannot_be_a_ghost() {
     let mut console = jumped(&[1]);

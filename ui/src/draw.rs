@@ -12,6 +12,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
+use crate::column::Column;
 use crate::model::Model;
 use crate::theme::{Role, Theme};
 use crate::wrap::unbroken;
@@ -136,6 +137,16 @@ pub fn scale(theme: &Theme, value: f64, low: f64, high: f64, width: usize) -> St
     let share = if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 };
     let at = (share * (inner - 1) as f64).round() as usize;
     format!("[{}o{}]", theme.line().repeat(at), theme.line().repeat(inner - 1 - at))
+}
+
+/// A measured displacement, angle or height with its sign, in three decimals; no -0.000 is shown.
+pub fn signed(value: f64) -> String {
+    format!("{:+.3}", if value.abs() < 0.0005 { 0.0 } else { value })
+}
+
+/// The measured quantity of a column: a time has no sign.
+pub fn measured_number(column: Column, value: f64) -> String {
+    if column == Column::Air { format!("{value:.3}") } else { signed(value) }
 }
 
 /// The value as one decimal shows it, never -0.0.

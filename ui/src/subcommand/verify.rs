@@ -64,7 +64,8 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
             );
             if !left_out.is_empty() {
                 let numbers = left_out.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-                put_line!("not compared, because a person, a fault or a crash ended them: trials {numbers}");
+                let (them, trials) = if left_out.len() == 1 { ("it", "trial") } else { ("them", "trials") };
+                put_line!("not compared, because a person, a fault or a crash ended {them}: {trials} {numbers}");
             }
             Ok(())
         }

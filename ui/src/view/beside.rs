@@ -6,8 +6,8 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
+use super::draw::{heading, measured_number, number, sign, span, truncate};
 use crate::column::Column;
-use crate::draw::{heading, number, sign, span, truncate};
 use crate::message::ComparedTrial;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
@@ -62,7 +62,10 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         })
     };
     let value = |value: Option<f64>| (value.map_or("-".to_owned(), number), Role::Text);
-    let signed = |value: Option<f64>| (value.map_or("-".to_owned(), |value| format!("{value:+.3}")), Role::Text);
+    let of_column = |row: &TrialRecord, column: Column| match measured(row, column) {
+        Some(value) => (measured_number(column, value), Role::Text),
+        None => ("-".to_owned(), Role::Text),
+    };
     let mut lines = Vec::new();
     lines.push(line("", [format!("A #{}", a.trial), format!("B #{}", b.trial)].map(|text| (text, Role::Key))));
     if let Some(name) = &b.recording {
@@ -77,7 +80,9 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
     }
     let unit = if a.unit == b.unit { format!("J {}", a.unit) } else { format!("J {},{}", a.unit, b.unit) };
     let of_row = |_: &ComparedTrial, row: &TrialRecord| {
-        let (shown, role) = value(row.value.or_else(|| model.session.measured_objective(row)));
+        // A trial without a verdict has what was measured; a void one has no value.
+        let measured = || model.session.measured_objective(row).filter(|_| row.verdict.is_none());
+        let (shown, role) = value(row.value.or_else(measured));
         // As in the table.
         (if row.counts_by_hand() { format!("{shown} h") } else { shown }, role)
     };
@@ -88,7 +93,7 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         lines.push(line(&format!("{name} {unit}"), both(&|_, row| value(row.parameters.get(name)))));
     }
     for (column, label) in MEASURED {
-        lines.push(line(label, both(&|_, row| signed(measured(row, column)))));
+        lines.push(line(label, both(&|_, row| of_column(row, column))));
     }
     let rows_of_values = lines.len();
     let room = usize::from(body.height).saturating_sub(rows_of_values);

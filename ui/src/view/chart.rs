@@ -226,13 +226,16 @@ impl Chart<'_> {
     fn draw_heading(&self, buffer: &mut Buffer, area: Rect) -> usize {
         let theme = &self.theme;
         let sample = self.named;
-        let contact = match (self.style.foot, sample.and_then(|sample| self.style.contact(sample))) {
+        let ghost = self.ghost.filter(|ghost| ghost.named).zip(self.cursor_ns);
+        // Two trials have two contacts, and one sign would be that of either.
+        let foot = self.style.foot.filter(|_| ghost.is_none());
+        let contact = match (foot, sample.and_then(|sample| self.style.contact(sample))) {
             (Some(_), Some(contact)) => theme.contact_indicator(contact),
             (Some(_), None) => " ",
             (None, _) => "",
         };
         let value = |decimals| sample.map_or("-".to_owned(), |sample| self.number(sample, decimals));
-        let ghost = self.ghost.filter(|ghost| ghost.named).zip(self.cursor_ns).map(|(ghost, time_ns)| {
+        let ghost = ghost.map(|(ghost, time_ns)| {
             let time_s = (time_ns as f64 - ghost.start_ns as f64) / 1e9;
             (at_trial_time(ghost.trace, time_s as f32), ghost.role)
         });

@@ -17,17 +17,18 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let repeated = points::lines(session, theme, usize::from(area.width));
     // Repeats have rows of their own where there are any to spare.
     let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
+    let legend_rows = legend(session, theme, area.width);
     let [upper, repeats, scatters, why, legend] = Layout::vertical([
         Constraint::Fill(1),
         Constraint::Length(repeat_rows),
         Constraint::Fill(1),
         Constraint::Fill(1),
-        Constraint::Length(1),
+        Constraint::Length(legend_rows.len() as u16),
     ])
     .areas(area);
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
-    render_legend(frame, legend, session, theme);
+    frame.render_widget(Paragraph::new(legend_rows), legend);
     objective::render(frame, history, session, theme);
     render_landings(frame, landings, session, theme);
     if repeat_rows > 0 {
@@ -103,12 +104,12 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     }
 }
 
-/// The signs of all panels, each whole, as far as there is room.
-fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
+/// The signs of all panels, each whole, in as many lines as they need.
+fn legend(session: &SessionModel, theme: &Theme, width: u16) -> Vec<Line<'static>> {
     let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
     let densities = session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| !p.at.is_empty()));
     let mut items = Vec::new();
-    let void = if area.width >= 100 { "void, without J" } else { "void" };
+    let void = if width >= 100 { "void, without J" } else { "void" };
     for (verdict, text) in
         [(Some(Verdict::Accept), "accept"), (Some(Verdict::Fall), "fall"), (Some(Verdict::Void), void)]
     {
@@ -144,14 +145,17 @@ fn render_legend(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &
     if session.simulator().is_none() && session.insight.as_ref().is_some_and(important) {
         items.push(("importance:", Role::Quiet, "for best tenth"));
     }
-    let mut spans = vec![Span::raw(" ")];
-    let mut left = usize::from(area.width.saturating_sub(1));
+    let (mut lines, mut line) = (Vec::new(), Line::from(" "));
     for (symbol, role, text) in items {
-        let Some(rest) = left.checked_sub(symbol.chars().count() + text.len() + 3) else { break };
-        left = rest;
-        spans.extend([span(theme, role, symbol), span(theme, Role::Quiet, format!(" {text}  "))]);
+        let sign = [span(theme, role, symbol), span(theme, Role::Quiet, format!(" {text}  "))];
+        // The two spaces behind the last sign of a line need no room.
+        if line.width() + sign[0].width() + sign[1].width() > usize::from(width) + 2 {
+            lines.push(std::mem::replace(&mut line, Line::from(" ")));
+        }
+        line.spans.extend(sign);
     }
-    frame.render_widget(Line::from(spans), area);
+    lines.push(line);
+    lines
 }
 
 /// Where the trunk came to rest, from above: forward is up, left is left, the start is `+`.

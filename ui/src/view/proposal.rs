@@ -10,7 +10,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{expectation, falls_near, heading, number, scale, span, with_deviation};
+use super::draw::{expectation, falls_near, heading, number, scale, signed, span, with_deviation};
 use super::points;
 use crate::action::Action;
 use crate::legal::{legal, may_request};
@@ -213,9 +213,9 @@ fn review(session: &SessionModel, theme: &Theme, trial: &TrialRecord) -> Vec<Lin
     }
     if let Some(m) = &trial.measured {
         let pair = |a, x, b, y| Line::from(vec![label(a), Span::raw(x), label(b), Span::raw(y)]);
-        lines.push(pair(" dx   ", format!("{:+.3} m", m.dx_m), "  dy  ", format!("{:+.3} m", m.dy_m)));
-        lines.push(pair(" rise ", format!("{:+.3} m", m.apex_m), "  air ", format!(" {:.3} s", m.air_s)));
-        lines.push(Line::from(vec![label(" yaw  "), Span::raw(format!("{:+.3} rad", m.dyaw_rad))]));
+        lines.push(pair(" dx   ", format!("{} m", signed(m.dx_m)), "  dy  ", format!("{} m", signed(m.dy_m))));
+        lines.push(pair(" rise ", format!("{} m", signed(m.apex_m)), "  air ", format!(" {:.3} s", m.air_s)));
+        lines.push(Line::from(vec![label(" yaw  "), Span::raw(format!("{} rad", signed(m.dyaw_rad)))]));
     }
     if let Some(verdict) = trial.suggested {
         let role = if verdict == Verdict::Accept { Role::Good } else { Role::Bad };

@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, heading, heading_width, number, sign, span, truncate};
+use super::draw::{clock, heading, heading_width, measured_number, number, sign, span, truncate};
 use crate::action::Action;
 use crate::column::Column;
 use crate::layout::first_row;
@@ -220,7 +220,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
     match column {
         Column::Parameters => (String::new(), Role::Text),
         Column::Dx | Column::Dy | Column::Yaw | Column::Rise | Column::Air => {
-            let value = measured(trial, column).map_or("-".to_owned(), |value| format!("{value:+.3}"));
+            let value = measured(trial, column).map_or("-".to_owned(), |value| measured_number(column, value));
             (format!("{value:>7}"), Role::Text)
         }
         Column::Value => {
