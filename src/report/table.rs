@@ -88,8 +88,8 @@ pub fn origins(rows: &[TrialRecord]) -> String {
     if origins.is_empty() { String::new() } else { format!("Judged {}\n", origins.join("; ")) }
 }
 
-/// The numbers of trials with values that an operator has set, as [`overrides`] lists them, and of re-runs, without those that did not
-/// run; empty without either.
+/// The numbers of trials with parameters or gains that an operator has set, as [`overrides`] lists them, and of re-runs, without those
+/// that did not run; empty without either.
 pub fn interventions(rows: &[TrialRecord]) -> String {
     let count = |of: fn(&TrialRecord) -> bool| rows.iter().filter(|row| of(row) && !row.was_not_run()).count();
     // An older version did not keep what was proposed.
@@ -97,7 +97,11 @@ pub fn interventions(rows: &[TrialRecord]) -> String {
     match (count(is_set), count(|row| row.source == ProposalSource::Rerun)) {
         (0, 0) => String::new(),
         (changed, reruns) => {
-            format!("{} with values that an operator has set, {}", counted(changed, "trial"), counted(reruns, "re-run"))
+            format!(
+                "{} with parameters or gains that an operator has set, {}",
+                counted(changed, "trial"),
+                counted(reruns, "re-run")
+            )
         }
     }
 }

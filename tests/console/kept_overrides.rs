@@ -35,12 +35,15 @@ fn a_later_session_and_the_table_of_a_study_show_the_proposed_values() {
     let shown = program.text(&["study", "show", place]);
     assert_shows(
         &shown,
-        &["1 trial with values that an operator has set, 0 re-runs", "Trial 0 ran with Fx 88.00 N, proposed "],
+        &[
+            "1 trial with parameters or gains that an operator has set, 0 re-runs",
+            "Trial 0 ran with Fx 88.00 N, proposed ",
+        ],
     );
     let report = program.text(&["report", place]);
     assert_shows(
         &report,
-        &["1 trial with values that an operator has set", "Values that an operator has set in place"],
+        &["1 trial with parameters or gains that an operator has set", "Values that an operator has set in place"],
     );
     let mut session = Session::start(&folder, (100, 30), &["--resume", place]);
     session.wait_for(&["Press A to arm"]);

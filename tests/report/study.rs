@@ -165,7 +165,8 @@ fn the_page_counts_overrides_and_reruns_that_ran() {
         },
     ];
     let shown = text::render(&study_page::summary(&study(0, rows)), 80);
-    assert!(shown.contains("2 trials with values that an operator has set, 2 re-runs."), "{shown}");
+    let shown = shown.replace('\n', " ");
+    assert!(shown.contains("2 trials with parameters or gains that an operator has set, 2 re-runs."), "{shown}");
     let shown = text::render(&study_page::summary(&study(0, vec![row(0, ProposalSource::Sampler, "")])), 80);
     assert!(!shown.contains("re-run"), "{shown}");
 }
