@@ -593,6 +593,9 @@ pub struct Session {
     pub host: ::prost::alloc::string::String,
     #[prost(string, tag = "20")]
     pub operator: ::prost::alloc::string::String,
+    /// value of each gain by the configuration; none in older recordings
+    #[prost(message, repeated, tag = "21")]
+    pub configured_gains: ::prost::alloc::vec::Vec<trial::Parameter>,
 }
 /// Limits by which a screen colours its values.
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]

@@ -218,6 +218,7 @@ pub fn session_info(options: &Options, recording: &str) -> SessionInfo {
         commit: options.provenance.commit.clone(),
         host: options.provenance.host.clone(),
         operator: options.provenance.operator.clone(),
+        configured_gains: options.config.task(options.task).gains().values(),
     }
 }
 

@@ -4,8 +4,8 @@
 use crate::optimize::ask::SamplerKind;
 use crate::telemetry::{ArmingCheck, ArmingCheckState, Counters, Mode, Tick, TransitionCause};
 use crate::trial::{
-    Approval, Backend, ExperimentStage, ParameterInfo, PointRecord, Proposal, ProposalInsight, SearchStatus, Task,
-    TrialRecord,
+    Approval, Backend, ExperimentStage, ParameterInfo, ParameterValues, PointRecord, Proposal, ProposalInsight,
+    SearchStatus, Task, TrialRecord,
 };
 
 /// A record with its time.
@@ -103,6 +103,8 @@ pub struct SessionInfo {
     pub host: String,
     /// Name of the operator.
     pub operator: String,
+    /// Value of each gain by the configuration, unit of [`SessionInfo::gains`]; empty in older recordings.
+    pub configured_gains: ParameterValues,
 }
 
 impl SessionInfo {

@@ -147,6 +147,7 @@ fn session(way: Way, ours: &mut SessionInfo, m: &mut frog::Session) -> Result<()
     way.copy(&mut ours.commit, &mut m.commit);
     way.copy(&mut ours.host, &mut m.host);
     way.copy(&mut ours.operator, &mut m.operator);
+    way.values(&mut ours.configured_gains, &mut m.configured_gains);
     match way {
         Way::Encode => {
             m.backend = ours.backend_name().to_owned();

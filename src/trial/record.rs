@@ -79,11 +79,6 @@ impl TrialRecord {
         self.proposed.iter().filter_map(own).collect()
     }
 
-    /// Whether its value was measured by hand.
-    pub fn value_is_by_hand(&self) -> bool {
-        self.hand_value.is_some() && self.hand_value == self.value
-    }
-
     /// Returns the origin of its parameters in words, with the trial that it repeats: `re-run of #3`.
     pub fn origin(&self) -> String {
         self.source.with_parent(self.parent)

@@ -568,6 +568,20 @@ fn a_value_by_hand_beside_a_suggested_fall_counts_if_accepted() {
     assert!(!screen.contains("0.000h"), "{screen}");
 }
 
+/// Regression: a fall has J = 0 by the rules, and beside a 0 by hand the table marked it as measured by hand.
+#[test]
+fn a_value_by_hand_counts_of_an_accepted_trial_alone() {
+    let mut console = Console::ready();
+    for (number, verdict, value) in [(0, Verdict::Fall, 0.0), (1, Verdict::Accept, 0.0)] {
+        let row = TrialRecord { hand_value: Some(0.0), value: Some(value), ..trial(number, Some(verdict), None) };
+        console.record(Record::Trial(row));
+    }
+    console.press(&["2"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&line_with(&screen, "x fall"), &["0.000  x fall"]);
+    assert_shows(&line_with(&screen, "o accept"), &["0.000h o accept"]);
+}
+
 /// Regression: at 80 columns the reason of a fault was cut, and the next refused key replaced the line that had all of it.
 #[test]
 fn the_reason_of_a_fault_comes_back_after_an_answer() {

@@ -274,6 +274,29 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
     assert!(replay.wait().success());
 }
 
+/// Regression: beside a running console the table of the study said "running" of a trial that a STOP had ended.
+#[test]
+fn another_shell_shows_that_a_stopped_trial_waits_for_its_verdict() {
+    let (folder, mut session) = Session::opened((120, 40), &["--trials", "1", "--seed", "3"]);
+    session.send("A");
+    session.wait_for(&["Press g twice to jump"]);
+    session.approve();
+    session.wait_for_long("the countdown is over", || session.screen().contains(" JUMP "));
+    session.send(" ");
+    session.wait_for(&["void (suggested)"]);
+    let recordings = folder.path().join("recordings");
+    let study = study(&if recordings.is_dir() { recordings } else { folder.path().to_owned() });
+    let show = || quadfrog(folder.path(), &["study", "show", study.to_str().expect("a path")]);
+    session.wait_until("it waits", || show().contains("Trial 0 waits for its verdict") && !show().contains("running"));
+    session.send("kq");
+    session.wait_for(&["Quit"]);
+    session.send("y");
+    session.wait();
+    // Without its session it runs again.
+    let shown = show();
+    assert!(!shown.contains("waits for its verdict"), "{shown}");
+}
+
 /// Regression: beside a running console, report and table said "running" and "no trial was accepted" of a trial whose verdict was on
 /// the screen.
 #[test]

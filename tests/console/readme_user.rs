@@ -97,6 +97,34 @@ fn a_trial_that_waits_for_its_verdict_has_none_on_the_timeline() {
     assert!(line.contains('?') && !line.contains('o'), "{line}");
 }
 
+/// Regression: before the playhead the timeline had the verdict of the recording's end, and the table above it the one until then.
+#[test]
+fn the_timeline_has_the_verdict_of_the_table_until_the_playhead() {
+    let mut console = Console::ready();
+    let run = |trial: u32, begin_s: u64| TrialRun {
+        trial,
+        begin_ns: begin_s * 1_000_000_000,
+        row_ns: 1,
+        impulse_ns: None,
+        end_ns: (begin_s + 1) * 1_000_000_000,
+    };
+    let changed = |number| (number, trial(number, Some(Verdict::Void), None));
+    let rows = [changed(0), changed(1), (2, trial(2, Some(Verdict::Accept), None))].into();
+    let timeline = ReplayTimeline { trials: vec![run(0, 1), run(1, 4), run(2, 8)], rows, ..ReplayTimeline::default() };
+    console.update(Msg::Timeline(Box::new(timeline)));
+    let at = |time_ns| ReplayStatus { time_ns, duration_ns: 10_000_000_000, ..ReplayStatus::default() };
+    console.update(Msg::Replay(at(3_000_000_000)));
+    console.record(Record::Trial(trial(0, Some(Verdict::Fall), None)));
+    let marks = |console: &Console| {
+        let line = console.screen(80, 24).lines().rev().nth(2).unwrap().to_owned();
+        line.chars().filter(char::is_ascii_alphabetic).collect::<String>()
+    };
+    // Trials 1 and 2 are after the playhead.
+    assert_eq!(marks(&console), "xvo");
+    console.record(Record::Trial(trial(0, Some(Verdict::Void), None)));
+    assert_eq!(marks(&console), "vvo");
+}
+
 /// Regression: frozen charts of a replay stayed beside every other place, and counted seconds of the clock on the wall.
 #[test]
 fn frozen_charts_of_a_replay_end_where_the_playhead_goes_elsewhere() {

@@ -426,6 +426,26 @@ fn finished() -> Console {
     console
 }
 
+/// Regression: a finished study that was resumed has no proposal, and neither its panel nor its tables named the changed gains of the
+/// best trial.
+#[test]
+fn the_changed_gains_of_the_best_are_known_without_a_proposal() {
+    let mut console = Console::new();
+    let configured_gains = vec![("kp".into(), 400.0), ("kd".into(), 8.0)].into();
+    console.record(Record::Session(SessionInfo { budget: 1, configured_gains, ..session() }));
+    let gains = vec![("kp".into(), 450.0), ("kd".into(), 8.0)].into();
+    console.record(Record::Trial(TrialRecord { gains, ..trial(0, Some(Verdict::Accept), None) }));
+    console.stage(ExperimentStage::Finished, 0);
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&line_with(&screen, "450.0"), &["kp", "was 400.0"]);
+        assert!(!screen.contains("kd "), "{screen}");
+    }
+    console.press(&["R", "PgDn"]);
+    let words = console.screen(120, 40).replace(['│', '\n'], "").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_shows(&words, &["other gains: kp 450 (newest configuration: 400)"]);
+}
+
 #[test]
 fn a_finished_study_says_so_and_what_comes_next() {
     let mut console = finished();

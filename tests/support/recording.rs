@@ -272,6 +272,7 @@ impl Draw {
                     late_share: self.number(),
                     late_ms: self.number(),
                 },
+                configured_gains: self.several(|d| (d.string(), d.number())).into(),
             }),
             1 => Record::Transition(Transition {
                 from: self.one_of(Mode::ALL),
@@ -449,6 +450,7 @@ pub fn session() -> SessionInfo {
         commit: "0123456789abcdef".into(),
         host: "lab".into(),
         operator: "anna".into(),
+        configured_gains: Vec::new().into(),
     }
 }
 

@@ -37,8 +37,6 @@ pub fn report(session: &SessionModel, width: usize) -> Vec<String> {
     let info = &session.info;
     let rows: Vec<TrialRecord> = session.trials.records.values().cloned().collect();
     let jumps = rows.iter().filter_map(|row| row.measured.as_ref()).map(|measured| measured.jumps.len()).max();
-    let gains = session.proposal.iter().flat_map(|proposal| &proposal.gains);
-    let configured = gains.map(|gain| (gain.name.clone(), gain.proposed)).collect();
     let machine = if info.is_hardware() { "hardware" } else { "simulated" };
     let study = ReportedStudy {
         place: info.study.clone(),
@@ -52,7 +50,10 @@ pub fn report(session: &SessionModel, width: usize) -> Vec<String> {
         parameters: info.parameters.iter().filter_map(|parameter| session.parameter(&parameter.name)).collect(),
         confirmation: session.confirmation(),
         best: session.trials.best().map(|best| best.trial),
-        other_gains_of_best: session.trials.best().map_or(String::new(), |best| best.other_gains(&configured)),
+        other_gains_of_best: session
+            .trials
+            .best()
+            .map_or(String::new(), |best| best.other_gains(&session.configured_gains())),
         fixed: Vec::new(),
         model_best: session.trials.model_best,
         limits: None,

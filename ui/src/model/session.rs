@@ -4,9 +4,9 @@ use quadfrog::optimize::repeats::LEAST_REPEATS;
 use quadfrog::recording::record::{ArmingCheckRecord, SessionInfo, StageRecord};
 use quadfrog::session::objective;
 use quadfrog::trial::{
-    Approval, ExperimentStage, ObjectiveRule, Overrides, ParameterInfo, ParameterInsight, PointRecord, Proposal,
-    ProposalInsight, ProposedParameter, QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison, TrialRecord,
-    Verdict,
+    Approval, ExperimentStage, ObjectiveRule, Overrides, ParameterInfo, ParameterInsight, ParameterValues, PointRecord,
+    Proposal, ProposalInsight, ProposedParameter, QueuedPoint, SearchStatus, SearchedParameter, SimulatorComparison,
+    TrialRecord, Verdict,
 };
 
 use super::log::SessionLog;
@@ -148,12 +148,23 @@ impl SessionModel {
 
     /// Returns the gains of the best trial that differ from the configured ones. Those that the study searches are parameters.
     pub fn changed_gains_of_best(&self) -> Vec<ProposedParameter> {
-        let Some((best, last)) = self.trials.best().zip(self.proposal.as_ref()) else { return Vec::new() };
-        let own =
-            |gain: &ProposedParameter| Some(ProposedParameter { value: best.gains.get(&gain.name)?, ..gain.clone() });
+        let Some(best) = self.trials.best() else { return Vec::new() };
+        let own = |(name, proposed): &(String, f64)| {
+            Some(ProposedParameter { name: name.clone(), value: best.gains.get(name)?, proposed: *proposed })
+        };
         let searched = |gain: &ProposedParameter| best.parameters.get(&gain.name).is_some();
-        let gains = last.gains.iter().filter_map(own);
+        let configured = self.configured_gains();
+        let gains = configured.iter().filter_map(own);
         gains.filter(|gain| gain.value != gain.proposed && !searched(gain)).collect()
+    }
+
+    /// Returns the gains of the session's configuration: in an older recording as the last proposal has them.
+    pub fn configured_gains(&self) -> ParameterValues {
+        if !self.info.configured_gains.is_empty() {
+            return self.info.configured_gains.clone();
+        }
+        let gains = self.proposal.iter().flat_map(|proposal| &proposal.gains);
+        gains.map(|gain| (gain.name.clone(), gain.proposed)).collect()
     }
 
     /// Returns the rows of the panel of the trial: its heading, parameters and gains, what is expected, the repeats.

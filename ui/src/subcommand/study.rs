@@ -288,14 +288,18 @@ fn show(selector: &StudySelector) -> Result<(), Failure> {
         let line = format!("landed {stood}/{repeats}, mean {mean:.3} {unit}, std {std:.3}");
         let _ = writeln!(text, "Trials {trials} are one point: {line}");
     }
-    let unjudged = |trial: &&Trial| experiment::waits_for_verdict(trial);
+    let ended = session_has_ended(&parse_storage(&selector.place));
+    // A void suggestion waits only as long as its session is there: without it the trial runs again.
+    let suggested = |trial: &Trial| {
+        rows.iter().any(|row| row.trial == trial.number && row.verdict.is_none() && row.suggested.is_some())
+    };
+    let unjudged = |trial: &&Trial| experiment::waits_for_verdict(trial) || !ended && suggested(trial);
     for trial in study.running().filter(unjudged) {
         let row = rows.iter().find(|row| row.trial == trial.number);
         let by_hand = row.and_then(|row| row.hand_value).map(|value| format!(", by hand {value:.3} {unit}"));
         let _ = writeln!(text, "Trial {} waits for its verdict{}", trial.number, by_hand.unwrap_or_default());
     }
     let undecided = |row: &&TrialRecord| row.verdict.is_none() && study.trial(row.trial).is_ok_and(|t| !unjudged(&t));
-    let ended = session_has_ended(&parse_storage(&selector.place));
     let (interrupted, running): (Vec<&TrialRecord>, Vec<&TrialRecord>) = rows
         .iter()
         .filter(undecided)

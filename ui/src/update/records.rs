@@ -332,7 +332,7 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
             // A study that is continued begins with the rows of the sessions before; other workers add theirs.
             let ran_elsewhere = !trial.was_not_run() && !model.session.trials.ran.contains_key(&trial.trial);
             let of = if ran_elsewhere { " of another session" } else { "" };
-            let by_hand = if trial.value_is_by_hand() { " by hand" } else { "" };
+            let by_hand = if trial.counts_by_hand() { " by hand" } else { "" };
             let verdict = trial.verdict_name().unwrap_or(verdict.name());
             format!("trial {}{of}{source}: {verdict}{value}{by_hand}", trial.trial)
         }

@@ -50,7 +50,9 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Mark::Looped => span(theme, Role::Warning, "="),
         Mark::Trial { later, index, .. } => {
             let trial = timeline.trials[index].trial;
-            let (symbol, role) = sign(timeline.verdict(trial));
+            // At the playhead an earlier trial may have another verdict than at the end: the table's.
+            let played = model.session.trials.records.get(&trial).and_then(|row| row.verdict).filter(|_| !later);
+            let (symbol, role) = sign(played.or(timeline.verdict(trial)));
             let symbol = if best == Some(trial) { "*" } else { symbol };
             span(theme, role_at(later, role), symbol)
         }

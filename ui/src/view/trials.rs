@@ -224,7 +224,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             (format!("{value:>7}"), Role::Text)
         }
         Column::Value => {
-            let hand = if trial.value_is_by_hand() { "h" } else { " " };
+            let hand = if trial.counts_by_hand() { "h" } else { " " };
             (format!("{:>8}{hand}", trial.value.map_or("-".to_owned(), number)), Role::Text)
         }
         Column::Verdict => {
