@@ -27,11 +27,15 @@ const MEASURED: [(Column, &str); 5] = [
 const FIXED_ROWS: usize = 4 + MEASURED.len();
 const LABEL: usize = 8;
 
-/// Rows that the panel needs, with a line for each cause, and those that it fills, with two.
-pub fn rows(comparison: &Comparison) -> [u16; 2] {
+/// Rows that the panel needs at least: a line for each cause.
+pub fn least_rows(comparison: &Comparison) -> u16 {
     let recording = usize::from(comparison.b.recording.is_some());
-    let values = FIXED_ROWS + recording + parameters(comparison).len();
-    [values + 2, values + 4].map(|rows| rows as u16)
+    (FIXED_ROWS + recording + parameters(comparison).len() + 2) as u16
+}
+
+/// Rows that the panel fills: two lines for each cause.
+pub fn rows(comparison: &Comparison) -> u16 {
+    least_rows(comparison) + 2
 }
 
 /// Names of the parameters of A, then the further ones of B.

@@ -55,7 +55,7 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
         return None;
     }
     // In a low terminal the table gives rows to the two trials that are compared.
-    let most = compared(model).map_or(14, |comparison| area.height.saturating_sub(beside::rows(comparison)[0]));
+    let most = compared(model).map_or(14, |comparison| area.height.saturating_sub(beside::least_rows(comparison)));
     let table_rows = (area.height / 4).clamp(5, 14).min(most.max(LEAST_TABLE_ROWS));
     let above_table = |area: Rect| Layout::vertical([Constraint::Fill(1), Constraint::Length(table_rows)]).areas(area);
     let side_columns = if area.width >= WIDE { (SIDE + 10).max(area.width * 3 / 10) } else { SIDE };
@@ -74,7 +74,7 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
         (beside(upper), table)
     };
     let card_rows = match compared(model) {
-        Some(comparison) => beside::rows(comparison)[1].min(side.height),
+        Some(comparison) => beside::rows(comparison).min(side.height),
         None => card_rows(model, side.width).min(side.height.saturating_sub(5)),
     };
     let room = side.height - card_rows;
