@@ -468,6 +468,25 @@ fn repeats_end_with_their_budget_or_when_they_are_called_off() {
     assert!(experiment.remove_queued(repeat + 1).unwrap_err().to_string().contains("is not in the queue"));
 }
 
+/// Regression: while the last repeat ran, the points were to be repeated "at most 0 times more".
+#[test]
+fn the_repeats_that_are_left_are_said_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    (0..5).for_each(|_| jump(&mut experiment, 0.0));
+    experiment.confirm_best(3).unwrap();
+    for left in [", at most 2 times more", ", at most once more", " for the last time"] {
+        let spec = approve(&mut experiment);
+        let words = confirmation_in_words(&study_in(folder.path()), 0.95).expect("a confirmation");
+        assert!(
+            words.starts_with("the points of trials ") && words.ends_with(&format!("are repeated{left}")),
+            "{words}"
+        );
+        experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, 1.0), 2);
+        experiment.judge(Verdict::Accept, false).unwrap();
+    }
+}
+
 /// Regressions: a trial that was queued after the last repeat said the result again, and the result did not say that the later trial
 /// is higher, nor how many jumps were wanted.
 #[test]

@@ -198,8 +198,12 @@ pub fn confirmation_in_words(study: &Study, confidence: f64) -> Option<String> {
             NextRepeat::Over(concluded, _) => concluded,
             NextRepeat::Repeat(_) | NextRepeat::None => {
                 let trials: Vec<String> = running.trials.iter().map(u32::to_string).collect();
-                let (trials, left) = (trials.join(", "), running.left(study.trials()));
-                return Some(format!("the points of trials {trials} are repeated, at most {left} times more"));
+                let more = match running.left(study.trials()) {
+                    0 => " for the last time".to_owned(),
+                    1 => ", at most once more".to_owned(),
+                    left => format!(", at most {left} times more"),
+                };
+                return Some(format!("the points of trials {} are repeated{more}", trials.join(", ")));
             }
         },
         None => kept.confirmed?,
