@@ -88,22 +88,21 @@ pub fn origins(rows: &[TrialRecord]) -> String {
     if origins.is_empty() { String::new() } else { format!("Judged {}\n", origins.join("; ")) }
 }
 
-/// The numbers of trials with parameters or gains that an operator has set, as [`overrides`] lists them, and of re-runs, without those
-/// that did not run; empty without either.
+/// The numbers of trials with parameters or gains that an operator has set, as [`overrides`] lists them, of re-runs and of queued
+/// points, without those that did not run; empty without any.
 pub fn interventions(rows: &[TrialRecord]) -> String {
     let count = |of: fn(&TrialRecord) -> bool| rows.iter().filter(|row| of(row) && !row.was_not_run()).count();
     // An older version did not keep what was proposed.
     let is_set = |row: &TrialRecord| row.source == ProposalSource::Operator || !row.overrides().is_empty();
-    match (count(is_set), count(|row| row.source == ProposalSource::Rerun)) {
-        (0, 0) => String::new(),
-        (changed, reruns) => {
-            format!(
-                "{} with parameters or gains that an operator has set, {}",
-                counted(changed, "trial"),
-                counted(reruns, "re-run")
-            )
-        }
+    let changed = count(is_set);
+    let reruns = count(|row| row.source == ProposalSource::Rerun);
+    let queued = count(|row| row.source == ProposalSource::Queued && row.overrides().is_empty());
+    if changed + reruns + queued == 0 {
+        return String::new();
     }
+    let (changed, reruns) = (counted(changed, "trial"), counted(reruns, "re-run"));
+    let queued = if queued == 0 { String::new() } else { format!(", {}", counted(queued, "queued point")) };
+    format!("{changed} with parameters or gains that an operator has set, {reruns}{queued}")
 }
 
 /// A line for each trial that ran with values in place of the proposed ones, `Trial 3 ran with Fx 100 N, proposed 63.55 N`.

@@ -301,7 +301,7 @@ fn the_question_about_a_rerun_says_when_it_runs() {
     console.press(&["2", "r"]);
     assert_shows(
         &console.screen(80, 24),
-        &["The parameters of trial #0 will be the proposal; a newly drawn one follows."],
+        &["The parameters of trial #0 will be the proposal; the sampler's comes after."],
     );
     console.press(&["Esc"]);
     let queued = |trial| QueuedPoint { trial, source: ProposalSource::Queued, ..QueuedPoint::default() };

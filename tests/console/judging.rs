@@ -579,6 +579,10 @@ fn a_value_by_hand_counts_of_an_accepted_trial_alone() {
     console.press(&["2"]);
     let screen = console.screen(120, 40);
     assert_shows(&line_with(&screen, "x fall"), &["0.000  x fall"]);
+    // One that waits and looks like an accept has the mark before its verdict.
+    let waiting = trial(2, None, Some(Verdict::Accept));
+    console.record(Record::Trial(TrialRecord { hand_value: Some(0.5), value: Some(0.5), ..waiting }));
+    assert_shows(&line_with(&console.screen(120, 40), "accept?"), &["0.500h"]);
     assert_shows(&line_with(&screen, "o accept"), &["0.000h o accept"]);
 }
 

@@ -263,7 +263,7 @@ fn the_reason_of_a_changed_verdict_comes_first_and_whole() {
 fn questions_say_what_will_happen() {
     let mut console = with_two_jumps();
     console.press(&["2", "Home", "r"]);
-    let asked = "The parameters of trial #0 will be the proposal; a newly drawn one follows.";
+    let asked = "The parameters of trial #0 will be the proposal; the sampler's comes after.";
     assert_shows(&console.screen(80, 24), &[asked]);
     console.press(&["Esc", "n"]);
     assert_shows(&console.screen(80, 24), &["Trial #2 will not be run"]);

@@ -163,10 +163,15 @@ fn the_page_counts_overrides_and_reruns_that_ran() {
             proposed: vec![("kp".to_owned(), 400.0)].into(),
             ..row(5, ProposalSource::Queued, "")
         },
+        // Regression: a point that was typed in the form and queued was not counted at all.
+        row(6, ProposalSource::Queued, ""),
     ];
     let shown = text::render(&study_page::summary(&study(0, rows)), 80);
     let shown = shown.replace('\n', " ");
-    assert!(shown.contains("2 trials with parameters or gains that an operator has set, 2 re-runs."), "{shown}");
+    assert!(
+        shown.contains("2 trials with parameters or gains that an operator has set, 2 re-runs, 1 queued point."),
+        "{shown}"
+    );
     let shown = text::render(&study_page::summary(&study(0, vec![row(0, ProposalSource::Sampler, "")])), 80);
     assert!(!shown.contains("re-run"), "{shown}");
 }

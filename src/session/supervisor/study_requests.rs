@@ -152,7 +152,9 @@ fn judged(judged: Result<(), RequestRefusal>, answer: String) -> JobOutput {
 
 /// Returns in words that a queued point is the proposal now; empty where others run before it.
 fn as_proposal(proposed: Option<u32>) -> String {
-    proposed.map_or(String::new(), |trial| format!(" as trial {trial}, the proposal now; a newly drawn one follows"))
+    proposed.map_or(String::new(), |trial| {
+        format!(" as trial {trial}, the proposal now; the sampler proposes again after it")
+    })
 }
 
 fn change(experiment: &mut Experiment, request: &OperatorRequest) -> Result<String, RequestRefusal> {

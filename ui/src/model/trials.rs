@@ -103,6 +103,11 @@ pub fn accepted_value(trial: &TrialRecord) -> Option<f64> {
     trial.value.filter(|_| trial.verdict == Some(Verdict::Accept))
 }
 
+/// Whether the value of a trial is measured by hand: of an accepted one, or of one that waits and looks like it.
+pub fn value_is_by_hand(trial: &TrialRecord) -> bool {
+    trial.value.is_some() && trial.hand_value.is_some() && trial.verdict.or(trial.suggested) == Some(Verdict::Accept)
+}
+
 /// The measured quantity of a column, where it is one.
 pub fn measured(trial: &TrialRecord, column: Column) -> Option<f64> {
     let m = trial.measured.as_ref()?;

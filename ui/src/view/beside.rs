@@ -11,7 +11,7 @@ use crate::column::Column;
 use crate::message::ComparedTrial;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
-use crate::model::trials::measured;
+use crate::model::trials::{measured, value_is_by_hand};
 use crate::theme::{Role, Theme};
 use crate::wrap::wrap;
 
@@ -88,7 +88,7 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         let measured = || model.session.measured_objective(row).filter(|_| row.verdict.is_none());
         let (shown, role) = value(row.value.or_else(measured));
         // As in the table.
-        (if row.counts_by_hand() { format!("{shown} h") } else { shown }, role)
+        (if value_is_by_hand(row) { format!("{shown} h") } else { shown }, role)
     };
     lines.push(line(&unit, both(&of_row)));
     lines.push(line("verdict", both(&|_, row| verdict(row))));

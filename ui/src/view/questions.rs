@@ -170,7 +170,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
                 Some(proposal) if confirms(proposal.source) => {
                     "will be the proposal; the repeat follows them".to_owned()
                 }
-                Some(_) => "will be the proposal; a newly drawn one follows".to_owned(),
+                Some(_) => "will be the proposal; the sampler's comes after".to_owned(),
             };
             let mut lines = vec![Line::from(format!("The parameters of trial #{trial} {follows}."))];
             let replaced = model.session.open_proposal().filter(|_| before == 0);

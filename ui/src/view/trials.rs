@@ -14,7 +14,7 @@ use crate::layout::first_row;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
 use crate::model::table_columns::{CellContent, ShownColumn, shown_columns};
-use crate::model::trials::{SortBy, measured};
+use crate::model::trials::{SortBy, measured, value_is_by_hand};
 use crate::text::remark;
 use crate::theme::Role;
 
@@ -224,7 +224,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
             (format!("{value:>7}"), Role::Text)
         }
         Column::Value => {
-            let hand = if trial.counts_by_hand() { "h" } else { " " };
+            let hand = if value_is_by_hand(trial) { "h" } else { " " };
             (format!("{:>8}{hand}", trial.value.map_or("-".to_owned(), number)), Role::Text)
         }
         Column::Verdict => {
