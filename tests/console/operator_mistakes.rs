@@ -278,8 +278,7 @@ fn a_study_with_every_mistake_of_the_review_is_complete() {
 #[test]
 fn another_shell_shows_that_a_stopped_trial_waits_for_its_verdict() {
     let (folder, mut session) = Session::opened((120, 40), &["--trials", "1", "--seed", "3"]);
-    session.send("A");
-    session.wait_for(&["Press g twice to jump"]);
+    stand(&mut session);
     session.approve();
     session.wait_for_long("the countdown is over", || session.screen().contains(" JUMP "));
     session.send(" ");

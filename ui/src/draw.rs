@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use quadfrog::printable::is_unprintable;
 pub use quadfrog::trial::four_digits as number;
-use quadfrog::trial::{ExpectedResult, FallRisk, Verdict};
+use quadfrog::trial::{ExpectedResult, FallRisk, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -14,6 +14,7 @@ use ratatui::text::{Line, Span};
 
 use crate::column::Column;
 use crate::model::Model;
+use crate::model::trials::measured;
 use crate::theme::{Role, Theme};
 use crate::wrap::unbroken;
 
@@ -144,9 +145,13 @@ pub fn signed(value: f64) -> String {
     format!("{:+.3}", if value.abs() < 0.0005 { 0.0 } else { value })
 }
 
-/// The measured quantity of a column: a time has no sign.
-pub fn measured_number(column: Column, value: f64) -> String {
-    if column == Column::Air { format!("{value:.3}") } else { signed(value) }
+/// The measured quantity of a column, `-` without one: a time has no sign.
+pub fn measured_number(trial: &TrialRecord, column: Column) -> String {
+    match measured(trial, column) {
+        Some(time_s) if column == Column::Air => format!("{time_s:.3}"),
+        Some(value) => signed(value),
+        None => "-".to_owned(),
+    }
 }
 
 /// The value as one decimal shows it, never -0.0.

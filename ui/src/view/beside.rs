@@ -11,7 +11,7 @@ use crate::column::Column;
 use crate::message::ComparedTrial;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
-use crate::model::trials::{measured, value_is_by_hand};
+use crate::model::trials::value_is_by_hand;
 use crate::theme::{Role, Theme};
 use crate::wrap::wrap;
 
@@ -66,10 +66,6 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         })
     };
     let value = |value: Option<f64>| (value.map_or("-".to_owned(), number), Role::Text);
-    let of_column = |row: &TrialRecord, column: Column| match measured(row, column) {
-        Some(value) => (measured_number(column, value), Role::Text),
-        None => ("-".to_owned(), Role::Text),
-    };
     let mut lines = Vec::new();
     lines.push(line("", [format!("A #{}", a.trial), format!("B #{}", b.trial)].map(|text| (text, Role::Key))));
     if let Some(name) = &b.recording {
@@ -97,7 +93,7 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         lines.push(line(&format!("{name} {unit}"), both(&|_, row| value(row.parameters.get(name)))));
     }
     for (column, label) in MEASURED {
-        lines.push(line(label, both(&|_, row| of_column(row, column))));
+        lines.push(line(label, both(&|_, row| (measured_number(row, column), Role::Text))));
     }
     let rows_of_values = lines.len();
     let room = usize::from(body.height).saturating_sub(rows_of_values);

@@ -14,7 +14,7 @@ use crate::layout::first_row;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
 use crate::model::table_columns::{CellContent, ShownColumn, shown_columns};
-use crate::model::trials::{SortBy, measured, value_is_by_hand};
+use crate::model::trials::{SortBy, value_is_by_hand};
 use crate::text::remark;
 use crate::theme::Role;
 
@@ -220,8 +220,7 @@ fn cell(model: &Model, trial: &TrialRecord, column: &ShownColumn, best: bool) ->
     match column {
         Column::Parameters => (String::new(), Role::Text),
         Column::Dx | Column::Dy | Column::Yaw | Column::Rise | Column::Air => {
-            let value = measured(trial, column).map_or("-".to_owned(), |value| measured_number(column, value));
-            (format!("{value:>7}"), Role::Text)
+            (format!("{:>7}", measured_number(trial, column)), Role::Text)
         }
         Column::Value => {
             let hand = if value_is_by_hand(trial) { "h" } else { " " };
