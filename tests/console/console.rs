@@ -52,6 +52,7 @@ mod recording;
 mod rejudge;
 mod rejudge_estimate;
 mod replay;
+mod replay_answers;
 mod replay_beside;
 mod replay_follow;
 mod replay_rejudge;

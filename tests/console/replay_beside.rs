@@ -215,7 +215,7 @@ fn what_cannot_lie_beside_is_refused() {
     for (typed, reason) in [
         ("77", "trial 77 is not in this recording"),
         ("0", "trial 0 is the one at the playhead"),
-        ("x", "`x` does not belong here: a number is typed; Esc cancels"),
+        ("x", "`x` does not belong here: type a number; Esc cancels"),
     ] {
         session.send(&format!("|{typed}\r"));
         session.wait_for(&[reason]);

@@ -91,6 +91,7 @@ fn a_compact_terminal_shows_the_trial_the_answer_and_the_next_step_whole() {
             text: long.clone(),
             stop: false,
             answer: false,
+            own: false,
             at: console.model.clock,
         });
         let screen = console.screen(columns, rows);

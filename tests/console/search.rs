@@ -109,7 +109,7 @@ fn a_parameter_is_fixed_for_some_trials_and_searched_again() {
     let refusals = [
         ("0", "is not a number of trials"),
         ("-1", "was not taken"),
-        ("many", "`y` does not belong here: a number is typed; Esc cancels"),
+        ("many", "`y` does not belong here: type a number; Esc cancels"),
     ];
     for (wrong, refusal) in refusals {
         let mut console = overriding();

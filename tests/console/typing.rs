@@ -94,7 +94,7 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     // With nothing typed there is nothing to confirm.
     let mut without_value = finished();
     assert_eq!(without_value.requests(&["C", "Backspace", "x", "Enter"]), []);
-    assert_shows(&without_value.screen(80, 24), &["`x` does not belong here: a number is typed; Esc cancels"]);
+    assert_shows(&without_value.screen(80, 24), &["`x` does not belong here: type a number; Esc cancels"]);
     assert_eq!(without_value.requests(&["Enter"]), []);
     assert_shows(&without_value.screen(80, 24), &["nothing was typed: a number of trials from 1 to 1000 is needed"]);
     // No trial is promised that may not exist.
@@ -105,7 +105,7 @@ fn a_field_of_a_number_takes_no_other_characters_and_says_so() {
     // The form of the overrides refuses a letter aloud, too.
     let mut console = Console::ready();
     assert_eq!(console.requests(&["o", "x"]), []);
-    assert_shows(&console.screen(80, 24), &["`x` does not belong here: a number is typed"]);
+    assert_shows(&console.screen(80, 24), &["`x` does not belong here: type a number"]);
 }
 
 /// Regression: the hint promises that an empty field goes back to the measured value, and Enter said that nothing was typed.
@@ -176,9 +176,9 @@ fn the_field_of_a_place_in_a_recording_says_what_it_takes() {
     console.update(Msg::Replay(ReplayStatus::default()));
     console.press(&["G", "?"]);
     let screen = console.screen(80, 24);
-    assert_shows(&screen, &["`?` does not belong here: a time, #7 for a trial, best or fall is typed"]);
+    assert_shows(&screen, &["`?` does not belong here: type a time, #7 for a trial, best or fall"]);
     console.press(&["Enter"]);
-    assert_shows(&console.screen(80, 24), &["a time, #7 for a trial, best or fall is typed; Esc"]);
+    assert_shows(&console.screen(80, 24), &["type a time, #7 for a trial, best or fall; Esc"]);
     assert_eq!(console.press(&["Enter"]), []);
     assert_shows(&console.screen(80, 24), &["nothing was typed: a time, #7 for a trial, best or fall is needed"]);
 }

@@ -269,6 +269,8 @@ pub struct ReplayTimeline {
     pub rows: BTreeMap<u32, TrialRecord>,
     /// Trials that fell, tripped a limit or were judged a fall at any time, whatever their verdict is now.
     pub falls: BTreeSet<u32>,
+    /// The last place of a fall or a fault, ns; none without one.
+    pub last_fall_ns: Option<u64>,
     /// Values that the operator has set in place of proposed ones.
     pub overrides: Overrides,
     /// The best trial at the end of the recording, by the rule of the table; none without an accepted one.

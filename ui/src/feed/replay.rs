@@ -336,11 +336,13 @@ impl ReplayFeed {
             lost_ns: self.recording.lost().iter().map(|lost| (lost.from_ns, lost.to_ns)).collect(),
             rows: self.recording.rows(),
             falls: self.recording.falls(),
+            last_fall_ns: None,
             overrides: self.recording.overrides(),
             best: best_of(&self.recording),
             begins_utc_ns: self.recording.begins_utc_ns(),
             second: self.pair.second(),
         };
+        self.whole.last_fall_ns = self.falls().next_back();
         self.jumped.push(Msg::Timeline(Box::new(self.whole.clone())));
     }
 

@@ -157,9 +157,9 @@ pub enum Purpose {
 }
 
 /// End of the message about a character that is not part of a number.
-pub const NOT_OF_A_NUMBER: &str = " does not belong here: a number is typed";
+pub const NOT_OF_A_NUMBER: &str = " does not belong here: type a number";
 /// End of the message about a character that is not part of a place in a recording.
-pub const NOT_OF_A_PLACE: &str = " does not belong here: a time, #7 for a trial, best or fall is typed";
+pub const NOT_OF_A_PLACE: &str = " does not belong here: type a time, #7 for a trial, best or fall";
 
 /// The places in a recording that can be typed; without a space where Space is STOP.
 pub fn places(space_is_text: bool) -> &'static str {

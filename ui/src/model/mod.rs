@@ -52,6 +52,8 @@ const DAMPED_TORQUE_N_M: f64 = 2.0;
 
 /// Time after which an answer goes, and a report of the session is no news any more.
 const NEWS_TIME: Duration = Duration::from_secs(15);
+/// Time for which the answer to a key in a replay stays before what the recording says.
+const READING_TIME: Duration = Duration::from_secs(4);
 
 /// Tilt of a robot that no longer lies on its belly, rad: half a right angle.
 const LYING_TILT_RAD: f64 = 0.25 * PI;
@@ -85,6 +87,8 @@ pub struct Notice {
     pub stop: bool,
     /// Whether it answers a request or a key: it goes with the next key that has an effect, or after its time.
     pub answer: bool,
+    /// Whether it answers a key of this console, not of the operator of a session that is replayed.
+    pub own: bool,
     /// When it was shown, on the console's clock.
     pub at: Duration,
 }
@@ -98,6 +102,11 @@ impl Notice {
     /// Whether it is no news any more at `clock`.
     pub fn is_old(&self, clock: Duration) -> bool {
         clock.saturating_sub(self.at) >= NEWS_TIME
+    }
+
+    /// Whether it is an answer that who pressed the key may not have read yet at `clock`.
+    pub fn is_being_read(&self, clock: Duration) -> bool {
+        self.answer && self.own && clock.saturating_sub(self.at) < READING_TIME
     }
 }
 
@@ -170,6 +179,8 @@ pub struct Model {
     /// The jumps of the running trial.
     pub jump_series: JumpSeries,
     pub message: Option<Notice>,
+    /// What a replayed session has said while an answer to a key of this console is being read.
+    pub message_after_answer: Option<Notice>,
     pub view: View,
     pub dialog: Option<Dialog>,
     pub live: LiveView,
@@ -234,6 +245,7 @@ impl Model {
             health_history_shown: false,
             jump_series: JumpSeries::default(),
             message: None,
+            message_after_answer: None,
             view: View::Live,
             dialog: None,
             live: LiveView {

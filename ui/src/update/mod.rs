@@ -51,12 +51,13 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
     match msg {
         Msg::Key(key) => return press(model, key),
         Msg::Mouse(event) => return mouse::handle(model, event),
-        Msg::Record(stamped) => return records::apply(model, stamped),
+        Msg::Record(stamped) => return records::apply_beside_answer(model, stamped),
         Msg::Suspend => return perform(model, Action::Suspend),
         Msg::Clock(now) => {
             model.clock = now;
             expire_interrupt(model);
             expire_answer(model);
+            records::end_answer(model);
             records::show_reason_again(model);
         }
         Msg::Resize(columns, rows) => {
@@ -103,6 +104,7 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.session = SessionModel::default();
             // It was about a later time of the recording.
             model.message = None;
+            model.message_after_answer = None;
             model.history.clear();
             model.jump_series = JumpSeries::default();
             model.health_history.clear();

@@ -9,7 +9,7 @@ use quadfrog::trial::{
     Approval, ExperimentStage, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits,
 };
 
-use super::request::{cancelled, reply, say};
+use super::request::{cancelled, quote, reply, say};
 use crate::action::Action;
 use crate::legal::legal;
 use crate::message::Effect;
@@ -84,7 +84,29 @@ fn renumber(model: &mut Model, proposal: &Proposal) {
     }
 }
 
-pub(super) fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
+/// Applies a record. In a replay what the session has said waits until the answer to a key of this console is read.
+pub(super) fn apply_beside_answer(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
+    let clock = model.clock;
+    let of_recording = model.replay.is_some() && model.observer().is_none();
+    let being_read = model.message.take_if(|message| of_recording && message.is_being_read(clock));
+    if being_read.is_none() {
+        return apply(model, stamped);
+    }
+    model.message = model.message_after_answer.take();
+    let effects = apply(model, stamped);
+    model.message_after_answer = std::mem::replace(&mut model.message, being_read);
+    effects
+}
+
+/// Shows what the replayed session has said since the answer to a key of this console, once that is gone or read.
+pub(super) fn end_answer(model: &mut Model) {
+    let clock = model.clock;
+    if !model.message.as_ref().is_some_and(|message| message.is_being_read(clock)) {
+        model.message = model.message_after_answer.take().or(model.message.take());
+    }
+}
+
+fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
     let time_ns = stamped.time_ns;
     let mut bells = Vec::new();
     match stamped.record {
@@ -314,7 +336,10 @@ fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
         "" => command.request.clone(),
         answer => format!("{}: {outcome}{answer}", command.request),
     };
-    reply(model, level, text.clone());
+    match model.replay.is_some() {
+        true => quote(model, level, &text),
+        false => reply(model, level, text.clone()),
+    }
     log(model, time_ns, level, "operator", text, false);
 }
 

@@ -32,12 +32,18 @@ pub(super) fn expire_interrupt(model: &mut Model) {
 
 /// Reports something of the session to the operator.
 pub fn say(model: &mut Model, level: LogLevel, text: impl Into<String>) {
-    model.message = Some(Notice { level, text: text.into(), stop: false, answer: false, at: model.clock });
+    model.message = Some(Notice { level, text: text.into(), stop: false, answer: false, own: false, at: model.clock });
 }
 
 /// Answers a request or a key of the operator: until the next key that has an effect, at most for the time of an answer.
 pub fn reply(model: &mut Model, level: LogLevel, text: impl Into<String>) {
-    model.message = Some(Notice { level, text: text.into(), stop: false, answer: true, at: model.clock });
+    model.message = Some(Notice { level, text: text.into(), stop: false, answer: true, own: true, at: model.clock });
+}
+
+/// Shows an answer that the operator of a session has got whom this console replays or watches.
+pub(super) fn quote(model: &mut Model, level: LogLevel, text: &str) {
+    reply(model, level, format!("the operator: {text}"));
+    model.message.iter_mut().for_each(|message| message.own = false);
 }
 
 /// Removes the answer to an earlier key.
@@ -53,8 +59,8 @@ pub(super) fn expire_answer(model: &mut Model) {
 
 /// Answers the STOP key.
 fn say_stop(model: &mut Model, text: &str) {
-    model.message =
-        Some(Notice { level: LogLevel::Warning, text: text.to_owned(), stop: true, answer: false, at: model.clock });
+    let (level, text) = (LogLevel::Warning, text.to_owned());
+    model.message = Some(Notice { level, text, stop: true, answer: false, own: true, at: model.clock });
 }
 
 /// Returns the answer to a key without a meaning; `keys` names those that work.

@@ -302,21 +302,28 @@ fn replay(model: &Model) -> NextStep {
     if let Some(old) = old.filter(|_| model.replay.as_ref().is_some_and(ReplayStatus::later_is_known)) {
         return step(old, model, &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play")]);
     }
+    let (next_fall, rest) = (
+        [(Action::NextFall, "next fall")],
+        [(Action::StepForward, "step"), (Action::Slower, "slower"), (Action::Faster, "faster"), (Action::Quit, "quit")],
+    );
+    let places = [
+        (Action::EndComparison, "end comparison"),
+        (Action::Seek, "go to"),
+        (Action::PreviousMarker, "previous trial"),
+        (Action::NextMarker, "next trial"),
+    ];
+    let next_fall = if fall_follows(model) { &next_fall[..] } else { &[] };
     step(
         format!("{key} {}", if playing { "pauses" } else { "plays" }),
         model,
-        &[
-            (Action::EndComparison, "end comparison"),
-            (Action::Seek, "go to"),
-            (Action::PreviousMarker, "previous trial"),
-            (Action::NextMarker, "next trial"),
-            (Action::NextFall, "next fall"),
-            (Action::StepForward, "step"),
-            (Action::Slower, "slower"),
-            (Action::Faster, "faster"),
-            (Action::Quit, "quit"),
-        ],
+        &[&places[..], next_fall, &rest].concat(),
     )
+}
+
+/// Whether a fall or a fault follows the playhead.
+fn fall_follows(model: &Model) -> bool {
+    let (Some(replay), Some(timeline)) = (&model.replay, &model.timeline) else { return false };
+    timeline.last_fall_ns > Some(replay.time_ns)
 }
 
 const FELL: &str = "FELL";

@@ -7,6 +7,7 @@ use ratatui::text::Line;
 
 use super::draw::span;
 use crate::action::Action;
+use crate::legal::may_request;
 use crate::model::Model;
 use crate::theme::Role;
 use crate::wrap::{unbroken, wrap, wrap_all};
@@ -26,6 +27,9 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
     let queue = model.session.queue();
     let finished = model.session.stage_is(ExperimentStage::Finished);
     let rerun = format!("{} in Trials queues the selected trial again.", key(Action::Rerun));
+    if queue.is_empty() && may_request(model).is_err() {
+        return (quiet(vec!["Nothing is queued.".to_owned()]), 0..0);
+    }
     if queue.is_empty() {
         let more = key(Action::Continue);
         let texts = match finished {
