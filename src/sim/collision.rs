@@ -4,22 +4,23 @@
 //! cylinder at the lowest point of each rim. Against a plane this is exact. Against the edges of steps and blocks the
 //! long edges of a box are sampled [`EDGE_SPACING`] apart: a narrower edge of a block can pass between two samples.
 
+use fearless_simd::Simd;
 use nalgebra::{Matrix3, Vector3};
 
 use super::config::{BodyKind, SimConfig, TerrainKind};
-use super::contact::{ContactPoint, ContactSolver};
-use super::dynamics::LegDynamics;
+use super::contact::{ContactCandidate, ContactSolver, SPEED_MARGIN};
+use super::dynamics::Dynamics;
+use super::lanes::{Lanes, Quad, with_lanes};
 use super::motion::{GeneralizedVelocity, StepContext, TRUNK};
 use super::six::split;
+use super::spatial::{AxisRotation, inner};
 use super::state::SimState;
-use super::terrain::{MAX_TERRAIN_CONTACTS, Terrain, TerrainContact};
+use super::terrain::{MAX_TERRAIN_CONTACTS, Terrain};
 use crate::robot::description::{CollisionShape, RigidBody, RobotDescription};
 use crate::robot::{LEGS, Leg, PerLeg};
 
 /// Largest distance of two samples along an edge, for contact between boxes, m.
 const EDGE_SPACING: f64 = 0.1;
-/// Speed that impulses of the same step may add to a point, m/s.
-const SPEED_MARGIN: f64 = 2.0;
 
 /// Geometry that can touch the ground.
 #[derive(Debug, Clone, Copy)]
@@ -61,12 +62,37 @@ struct ProbeBounds {
     count: usize,
 }
 
+/// Bounds on the same link of every leg, one per leg.
+#[derive(Debug, Clone, Copy)]
+struct LegBounds {
+    link: usize,
+    center: Vector3<Quad>,
+    half_extents: Vector3<Quad>,
+    /// Negative infinity for a leg without such bounds.
+    radius: Quad,
+}
+
+/// Heights of the legs at the current state.
+struct LegSurvey {
+    /// Centres of the feet, body axes, m.
+    foot_body: PerLeg<Vector3<f64>>,
+    /// Heights of their centres above the highest ground, m.
+    foot_height: PerLeg<f64>,
+    /// Whether a link of a leg can be within reach of the ground.
+    links_are_near: bool,
+}
+
 /// All collision geometry of the robot.
 #[derive(Debug, Clone)]
 pub(super) struct Collider {
     /// The feet first, one per leg.
     probes: Vec<Probe>,
+    /// Those of trunk and links; the feet have none.
     bounds: Vec<ProbeBounds>,
+    /// Those of `bounds` that belong to legs, four at a time.
+    leg_bounds: Vec<LegBounds>,
+    /// Centres of the feet in the calves' frames, m.
+    feet: Vector3<Quad>,
     /// Whether contact of each probe is a sign of a fall.
     falls: Vec<bool>,
     /// Upper bound of the distance of a point from the trunk's origin or from a joint that moves it, m.
@@ -75,7 +101,15 @@ pub(super) struct Collider {
 
 impl Collider {
     pub fn new(description: &RobotDescription, config: &SimConfig) -> Collider {
-        let mut collider = Collider { probes: Vec::new(), bounds: Vec::new(), falls: Vec::new(), extent: 0.0 };
+        let parts = description.legs.each_ref();
+        let mut collider = Collider {
+            probes: Vec::new(),
+            bounds: Vec::new(),
+            leg_bounds: Vec::new(),
+            feet: Quad::vectors(&parts.map(|leg| leg.foot_origin)),
+            falls: Vec::new(),
+            extent: 0.0,
+        };
         let spacing = match config.terrain.kind {
             TerrainKind::Flat | TerrainKind::Slope => f64::INFINITY,
             TerrainKind::Steps | TerrainKind::Blocks => EDGE_SPACING,
@@ -83,7 +117,6 @@ impl Collider {
         for (leg, part) in description.legs.iter().enumerate() {
             let shape = ProbeShape::Sphere { radius: part.foot_radius };
             collider.probes.push(Probe { leg, link: 2, center: part.foot_origin, shape });
-            collider.add_bound(leg);
         }
         let touches = |kind| config.contact.bodies.contains(&kind);
         if touches(BodyKind::Trunk) {
@@ -106,12 +139,17 @@ impl Collider {
             i >= LEGS && config.contact.fall_bodies.contains(&kind)
         }))
         .collect();
+        collider.leg_bounds = (0..3).flat_map(|link| leg_bounds(&collider.bounds, link)).collect();
         // The length of the stretched leg, plus the shape at its end.
-        for bound in &collider.bounds {
-            let origins = description.legs.get(bound.leg).map_or(&[][..], |leg| &leg.joint_origin[..=bound.link]);
-            let leg: f64 = origins.iter().map(|origin| origin.norm()).sum();
-            collider.extent = collider.extent.max(leg + bound.center.norm() + bound.half_extents.norm() + bound.radius);
-        }
+        let length = |leg: usize, link: usize| {
+            let origins = description.legs.get(leg).map_or(&[][..], |leg| &leg.joint_origin[..=link]);
+            origins.iter().map(|origin| origin.norm()).sum::<f64>()
+        };
+        let feet = parts.iter().enumerate().map(|(i, leg)| length(i, 2) + leg.foot_origin.norm() + leg.foot_radius);
+        let bodies = collider.bounds.iter().map(|bound| {
+            length(bound.leg, bound.link) + bound.center.norm() + bound.half_extents.norm() + bound.radius
+        });
+        collider.extent = feet.chain(bodies).fold(0.0, f64::max);
         collider
     }
 
@@ -175,16 +213,25 @@ impl Collider {
     /// Adds to `solver` every point that can touch in the step.
     pub fn find(&self, step: &StepContext, solver: &mut ContactSolver) {
         let reach = step.h * (self.fastest(step.free_velocity) + SPEED_MARGIN);
-        let velocity = GeneralizedVelocity::of(step.state);
-        self.near(step.legs, step.state, step.terrain, step.world_from_body, reach, |probe, i, sphere| {
-            for (k, contact) in
-                step.terrain.contacts(&sphere.center_world, sphere.radius, reach).into_iter().enumerate()
+        self.near(step.dynamics, step.state, step.terrain, step.world_from_body, reach, |probe, i, sphere| {
+            for (k, ground) in step.terrain.contacts(&sphere.center_world, sphere.radius, reach).into_iter().enumerate()
             {
-                if let Some(contact) = contact {
-                    add_contact(step, &velocity, probe, MAX_TERRAIN_CONTACTS * i + k, &sphere, &contact, solver);
+                if let Some(ground) = ground {
+                    solver.add_candidate(
+                        step,
+                        ContactCandidate {
+                            leg: probe.leg,
+                            link: probe.link,
+                            warm_start_slot: MAX_TERRAIN_CONTACTS * i + k,
+                            center_body: sphere.center_body,
+                            radius: sphere.radius,
+                            ground,
+                        },
+                    );
                 }
             }
         });
+        solver.add_contacts(step);
     }
 
     /// Upper bound of the speed of any point: |v| + r |w| + l (|dq_1| + |dq_2| + |dq_3|), m/s.
@@ -195,11 +242,11 @@ impl Collider {
     }
 
     /// Smallest distance of a probe to the ground, m.
-    pub fn smallest_gap(&self, legs: &PerLeg<LegDynamics>, state: &SimState, terrain: &Terrain) -> f64 {
+    pub fn smallest_gap(&self, dynamics: &Dynamics, state: &SimState, terrain: &Terrain) -> f64 {
         let world_from_body = state.world_from_body.to_rotation_matrix().into_inner();
         let mut smallest = f64::INFINITY;
         self.near(
-            legs,
+            dynamics,
             state,
             terrain,
             &world_from_body,
@@ -219,7 +266,7 @@ impl Collider {
     #[inline]
     fn near(
         &self,
-        legs: &PerLeg<LegDynamics>,
+        dynamics: &Dynamics,
         state: &SimState,
         terrain: &Terrain,
         world_from_body: &Matrix3<f64>,
@@ -228,16 +275,25 @@ impl Collider {
     ) {
         let up_body = world_from_body.tr_mul(&terrain.normal());
         let base = terrain.clearance(&state.position_world);
-        // Height of a point p of a link: height of its frame's origin + up . p in link axes.
-        let links: PerLeg<[(f64, Vector3<f64>); 3]> = std::array::from_fn(|leg| {
-            let leg: &LegDynamics = &legs[leg];
-            let up_links = leg.in_links(&up_body);
-            std::array::from_fn(|link| (base + up_body.dot(&leg.origin_body[link]), up_links[link]))
-        });
+        let survey = with_lanes!(dynamics.instructions(), simd => self.survey(simd, dynamics, &up_body, base, reach));
+        for (i, probe) in self.probes[..LEGS].iter().enumerate() {
+            let radius = probe.shape.radius();
+            if survey.foot_height[i] <= radius + reach {
+                let center_body = survey.foot_body[i];
+                let center_world = state.position_world + world_from_body * center_body;
+                visit(probe, i, ProbeSphere { center_body, center_world, radius });
+            }
+        }
+        let legs = survey.links_are_near.then(|| dynamics.legs());
         for bound in &self.bounds {
-            let (height, up_link) = match bound.leg {
-                TRUNK => (base, up_body),
-                leg => links[leg][bound.link],
+            // Height of a point p of a link: height of its frame's origin + up . p in link axes.
+            let (height, up_link) = match (bound.leg, &legs) {
+                (TRUNK, _) => (base, up_body),
+                (_, None) => continue,
+                (leg, Some(legs)) => {
+                    let leg = &legs[leg];
+                    (base + up_body.dot(&leg.origin_body[bound.link]), leg.in_links(&up_body)[bound.link])
+                }
             };
             // Height of the box's lowest corner, less the radius about it.
             let half = &bound.half_extents;
@@ -251,15 +307,78 @@ impl Collider {
                     continue;
                 }
                 let (center_link, radius) = probe.shape.lowest(&probe.center, &up_link);
-                let center_body = match bound.leg {
-                    TRUNK => center_link,
-                    leg => legs[leg].in_body(bound.link, &center_link),
+                let center_body = match (bound.leg, &legs) {
+                    (leg, Some(legs)) if leg != TRUNK => legs[leg].in_body(bound.link, &center_link),
+                    _ => center_link,
                 };
                 let center_world = state.position_world + world_from_body * center_body;
                 visit(probe, i, ProbeSphere { center_body, center_world, radius });
             }
         }
     }
+
+    /// Finds the heights of feet and links above the highest ground, above which the trunk's origin is by `base`.
+    #[inline(always)]
+    fn survey<S: Simd>(
+        &self,
+        simd: S,
+        dynamics: &Dynamics,
+        up_body: &Vector3<f64>,
+        base: f64,
+        reach: f64,
+    ) -> LegSurvey {
+        let (factors, [thigh, calf]) = (dynamics.leg_factors(), dynamics.link_rotations());
+        let rotation =
+            |r: AxisRotation<Quad>| AxisRotation { cos: Lanes::load(simd, r.cos), sin: Lanes::load(simd, r.sin) };
+        let (hip, thigh, calf) = (rotation(factors.hip), rotation(thigh), rotation(calf));
+        let splat = |x: f64| Lanes::splat(simd, x);
+        let up = Vector3::new(splat(up_body.x), splat(up_body.y), splat(up_body.z));
+        let up_hip = hip.unrotate_x(&up);
+        let up_links = [up_hip, thigh.unrotate_y(&up_hip), calf.unrotate_y(&up_hip)];
+        let height = |link: usize| splat(base) + inner(&up, &Lanes::vector(simd, &factors.origin_body[link]));
+        let heights = [height(0), height(1), height(2)];
+
+        let foot = Lanes::vector(simd, &self.feet);
+        let foot_height = heights[2] + inner(&up_links[2], &foot);
+        let foot_body = Lanes::vector(simd, &factors.origin_body[2]) + hip.rotate_x(&calf.rotate_y(&foot));
+        let mut links_are_near = false;
+        for bounds in &self.leg_bounds {
+            let (up, half) = (&up_links[bounds.link], Lanes::vector(simd, &bounds.half_extents));
+            let depth = up.x.abs() * half.x + up.y.abs() * half.y + up.z.abs() * half.z;
+            let lowest = heights[bounds.link] + inner(up, &Lanes::vector(simd, &bounds.center))
+                - depth
+                - Lanes::load(simd, bounds.radius);
+            // What is left out is left out without rounding, too.
+            links_are_near |= lowest.store().0.iter().any(|gap| *gap <= reach + 1e-9);
+        }
+        let [x, y, z] = [foot_body.x.store().0, foot_body.y.store().0, foot_body.z.store().0];
+        LegSurvey {
+            foot_body: std::array::from_fn(|leg| Vector3::new(x[leg], y[leg], z[leg])),
+            foot_height: foot_height.store().0,
+            links_are_near,
+        }
+    }
+}
+
+/// Returns the bounds on the link `link` of every leg, four at a time.
+fn leg_bounds(bounds: &[ProbeBounds], link: usize) -> Vec<LegBounds> {
+    let of_leg = |leg: usize| bounds.iter().filter(|b| (b.leg, b.link) == (leg, link)).copied().collect::<Vec<_>>();
+    let legs: PerLeg<Vec<ProbeBounds>> = std::array::from_fn(of_leg);
+    let most = legs.iter().map(Vec::len).max().unwrap_or_default();
+    (0..most)
+        .map(|n| {
+            let bounds = legs.each_ref().map(|leg| leg.get(n).copied());
+            let vectors = |f: fn(&ProbeBounds) -> Vector3<f64>| {
+                Quad::vectors(&bounds.map(|bound| bound.as_ref().map_or(Vector3::zeros(), f)))
+            };
+            LegBounds {
+                link,
+                center: vectors(|bound| bound.center),
+                half_extents: vectors(|bound| bound.half_extents),
+                radius: Quad(bounds.map(|bound| bound.map_or(f64::NEG_INFINITY, |bound| bound.radius))),
+            }
+        })
+        .collect()
 }
 
 impl ProbeShape {
@@ -282,61 +401,6 @@ impl ProbeShape {
             }
         }
     }
-}
-
-/// Adds a contact to `solver` if its gap can close within the step.
-#[inline]
-fn add_contact(
-    step: &StepContext,
-    velocity: &GeneralizedVelocity,
-    probe: &Probe,
-    warm_start_slot: usize,
-    sphere: &ProbeSphere,
-    contact: &TerrainContact,
-    solver: &mut ContactSolver,
-) {
-    let StepContext { legs, terrain, world_from_body, h, .. } = *step;
-    let normal_body = world_from_body.tr_mul(&contact.normal_world);
-    let position_body = sphere.center_body - normal_body * (sphere.radius + contact.gap.min(0.0));
-    let leg_jacobian = match probe.leg {
-        TRUNK => Matrix3::zeros(),
-        leg => legs[leg].point_jacobian(probe.link, &position_body),
-    };
-    let ground_velocity_body = match contact.block {
-        Some(block) => world_from_body.tr_mul(&terrain.block_velocity(block)),
-        None => Vector3::zeros(),
-    };
-    let free_velocity_body =
-        point_velocity(step.free_velocity, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body;
-    if contact.gap + h * (normal_body.dot(&free_velocity_body) - SPEED_MARGIN) > 0.0 {
-        return;
-    }
-    let point = ContactPoint {
-        leg: probe.leg,
-        warm_start_slot,
-        position_body,
-        normal_body,
-        leg_jacobian,
-        gap: contact.gap,
-        friction: contact.friction,
-        velocity_body: point_velocity(velocity, probe.leg, &leg_jacobian, &position_body) - ground_velocity_body,
-        free_velocity_body,
-        block: contact.block,
-    };
-    solver.add_point(step, &point);
-}
-
-/// Returns the velocity of a point at `p_body` on `leg`, body axes: v + w x p + J_l dq.
-#[inline]
-fn point_velocity(
-    v: &GeneralizedVelocity,
-    leg: usize,
-    leg_jacobian: &Matrix3<f64>,
-    p_body: &Vector3<f64>,
-) -> Vector3<f64> {
-    let (linear, angular) = split(&v.trunk);
-    let trunk = linear + angular.cross(p_body);
-    if leg == TRUNK { trunk } else { trunk + leg_jacobian * v.legs[leg] }
 }
 
 /// Returns the corners of a box, and points along its edges no farther apart than `spacing`.

@@ -17,49 +17,29 @@
 //! Six-vectors have the linear part first, in body axes at the trunk's origin.
 
 use fearless_simd::{Level, Simd};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Scalar, Vector3};
 
 use super::lanes::{Lanes, Quad, with_lanes};
+use super::leg::{LegFactors, LegLinks};
 use super::model::{LegsModel, RobotModel};
 use super::six::{Cholesky6, Six, split, stack};
 use super::spatial::{AxisRotation, Real, SpatialForce, SpatialInertia, SpatialMotion, cross};
 use super::state::{Acceleration, SimState};
-use crate::robot::{GRAVITY, Joints, LEGS, PerLeg, leg_of};
+use crate::robot::{GRAVITY, Joints, PerLeg, leg_of};
 
 /// Kinematics of all legs and their coupling to the trunk. `T` is a number per leg.
 #[derive(Debug, Clone)]
-pub(super) struct LegLanes<T> {
-    /// Rotation of the hip link about x.
-    hip: AxisRotation<T>,
+struct LegLanes<T: Scalar> {
     /// Rotation of thigh and calf about the hip link's y.
     thigh: AxisRotation<T>,
     calf: AxisRotation<T>,
-    /// Joint origins in the trunk's frame, m.
-    origin_body: [Vector3<T>; 3],
     /// H: mass matrix of the leg's joints, kg m^2: 11, 12, 13, 22, 23, 33.
     mass: [T; 6],
     /// F: a column for each joint.
     coupling: [[T; 6]; 3],
     /// c: velocity and gravity terms, N m.
     bias: [T; 3],
-    /// C^-1: inverse of the lower Cholesky factor of H: 11, 21, 22, 31, 32, 33.
-    factor_inverse: [T; 6],
-    /// G = H^-1 F^T: a row for each joint.
-    gain: [[T; 6]; 3],
-}
-
-/// Kinematics and factors of one leg.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LegDynamics {
-    hip: AxisRotation<f64>,
-    thigh: AxisRotation<f64>,
-    calf: AxisRotation<f64>,
-    /// Joint origins in the trunk's frame, m.
-    pub origin_body: [Vector3<f64>; 3],
-    /// C^-1.
-    pub factor_inverse: Matrix3<f64>,
-    /// G: a row for each joint.
-    pub gain: [Six; 3],
+    factors: LegFactors<T>,
 }
 
 /// Equations of motion at one state.
@@ -142,20 +122,15 @@ impl<S: Simd> LegLanes<Lanes<S>> {
         let coupling = [column(f1, hip, &origin_hip), column(f2, hip, &origin_hip), column(f3, hip, &origin_hip)];
         let mass = [h11, h12, h13, h22, h23, h33];
         let (factor_inverse, gain) = factor(&mass, &added, &coupling);
+        let origin_body =
+            [origin_hip, origin_hip + hip.rotate_x(&origin_thigh), origin_hip + hip.rotate_x(&origin_calf)];
         let legs = LegLanes {
-            hip,
             thigh,
             calf,
-            origin_body: [
-                origin_hip,
-                origin_hip + hip.rotate_x(&origin_thigh),
-                origin_hip + hip.rotate_x(&origin_calf),
-            ],
             mass,
             coupling,
             bias: [p1.angular.x, p2.about_y(&origin_thigh), p3.about_y(&origin_calf)],
-            factor_inverse,
-            gain,
+            factors: LegFactors { hip, origin_body, factor_inverse, gain },
         };
         (legs, composite_hip.rotated_x(hip).moved(&origin_hip), p1.in_parent(hip, &origin_hip))
     }
@@ -169,16 +144,17 @@ impl<S: Simd> LegLanes<Lanes<S>> {
                 *to = lanes.store();
             }
         }
-        (to.hip, to.thigh, to.calf) =
-            (self.hip.map(Lanes::store), self.thigh.map(Lanes::store), self.calf.map(Lanes::store));
-        for (to, origin) in to.origin_body.iter_mut().zip(&self.origin_body) {
-            *to = origin.map(Lanes::store);
-        }
+        (to.thigh, to.calf) = (self.thigh.map(Lanes::store), self.calf.map(Lanes::store));
         store(&self.mass, &mut to.mass);
         store(self.coupling.as_flattened(), to.coupling.as_flattened_mut());
         store(&self.bias, &mut to.bias);
-        store(&self.factor_inverse, &mut to.factor_inverse);
-        store(self.gain.as_flattened(), to.gain.as_flattened_mut());
+        let (factors, to) = (&self.factors, &mut to.factors);
+        to.hip = factors.hip.map(Lanes::store);
+        for (to, origin) in to.origin_body.iter_mut().zip(&factors.origin_body) {
+            *to = origin.map(Lanes::store);
+        }
+        store(&factors.factor_inverse, &mut to.factor_inverse);
+        store(factors.gain.as_flattened(), to.gain.as_flattened_mut());
     }
 }
 
@@ -186,7 +162,7 @@ impl LegLanes<Quad> {
     /// C^-1.
     #[inline(always)]
     fn factor_inverse<S: Simd>(&self, simd: S) -> [Lanes<S>; 6] {
-        let load = |i: usize| Lanes::load(simd, self.factor_inverse[i]);
+        let load = |i: usize| Lanes::load(simd, self.factors.factor_inverse[i]);
         [load(0), load(1), load(2), load(3), load(4), load(5)]
     }
 
@@ -204,7 +180,7 @@ impl LegLanes<Quad> {
         let mut joint = *free;
         for (k, t) in trunk.iter().enumerate() {
             let t = Lanes::splat(simd, *t);
-            for (joint, gain) in joint.iter_mut().zip(&self.gain) {
+            for (joint, gain) in joint.iter_mut().zip(&self.factors.gain) {
                 *joint -= Lanes::load(simd, gain[k]) * t;
             }
         }
@@ -265,53 +241,22 @@ fn factor<S: Simd>(
     (inverse, gain)
 }
 
-impl LegDynamics {
-    /// Velocity of a point at `p_body` on the link `link` (0 hip, 1 thigh, 2 calf) per joint velocity, body axes.
-    #[inline]
-    pub fn point_jacobian(&self, link: usize, p_body: &Vector3<f64>) -> Matrix3<f64> {
-        // Column j: e_j x (p - o_j);  e_1 = x, e_2 = e_3 = (0, cos q1, sin q1).
-        let (c, s) = (self.hip.cos, self.hip.sin);
-        let about_y = |r: Vector3<f64>| Vector3::new(c * r.z - s * r.y, s * r.x, -c * r.x);
-        let r1 = p_body - self.origin_body[0];
-        let column1 = Vector3::new(0.0, -r1.z, r1.y);
-        let column2 = if link >= 1 { about_y(p_body - self.origin_body[1]) } else { Vector3::zeros() };
-        let column3 = if link >= 2 { about_y(p_body - self.origin_body[2]) } else { Vector3::zeros() };
-        Matrix3::from_columns(&[column1, column2, column3])
-    }
-
-    /// Transforms a point of link `link` (0 hip, 1 thigh, 2 calf) to the trunk's frame.
-    #[inline]
-    pub fn in_body(&self, link: usize, p: &Vector3<f64>) -> Vector3<f64> {
-        let turned = match link {
-            0 => *p,
-            1 => self.thigh.rotate_y(p),
-            _ => self.calf.rotate_y(p),
-        };
-        self.origin_body[link] + self.hip.rotate_x(&turned)
-    }
-
-    /// Rotates a vector from the trunk's axes to the axes of each link.
-    #[inline]
-    pub fn in_links(&self, v_body: &Vector3<f64>) -> [Vector3<f64>; 3] {
-        let v = self.hip.unrotate_x(v_body);
-        [v, self.thigh.unrotate_y(&v), self.calf.unrotate_y(&v)]
-    }
-}
-
 impl Dynamics {
     /// Memory for the equations of `model`; [`Dynamics::update`] computes them.
     pub fn of(model: &RobotModel) -> Dynamics {
         let rotation = AxisRotation { cos: Quad::ZERO, sin: Quad::ZERO };
         let legs = LegLanes {
-            hip: rotation,
             thigh: rotation,
             calf: rotation,
-            origin_body: [Vector3::new(Quad::ZERO, Quad::ZERO, Quad::ZERO); 3],
             mass: [Quad::ZERO; 6],
             coupling: [[Quad::ZERO; 6]; 3],
             bias: [Quad::ZERO; 3],
-            factor_inverse: [Quad::ZERO; 6],
-            gain: [[Quad::ZERO; 6]; 3],
+            factors: LegFactors {
+                hip: rotation,
+                origin_body: [Vector3::new(Quad::ZERO, Quad::ZERO, Quad::ZERO); 3],
+                factor_inverse: [Quad::ZERO; 6],
+                gain: [[Quad::ZERO; 6]; 3],
+            },
         };
         let factor = Cholesky6::IDENTITY;
         Dynamics { legs, composite: model.trunk, bias: [0.0; 6], factor, instructions: model.instructions }
@@ -354,7 +299,7 @@ impl Dynamics {
 
         // I_A = I_0 - sum F G; only the lower triangle is used.
         let mut articulated = columns(&composite);
-        let ([f1, f2, f3], [g1, g2, g3]) = (&legs.coupling, &legs.gain);
+        let ([f1, f2, f3], [g1, g2, g3]) = (&legs.coupling, &legs.factors.gain);
         for j in 0..6 {
             for i in j..6 {
                 articulated[j][i] -= (f1[i] * g1[j] + f2[i] * g2[j] + f3[i] * g3[j]).sum();
@@ -430,41 +375,23 @@ impl Dynamics {
     }
 
     /// The legs one by one.
-    pub fn legs(&self) -> PerLeg<LegDynamics> {
-        let identity = AxisRotation { cos: 1.0, sin: 0.0 };
-        let mut out = [LegDynamics {
-            hip: identity,
-            thigh: identity,
-            calf: identity,
-            origin_body: [Vector3::zeros(); 3],
-            factor_inverse: Matrix3::zeros(),
-            gain: [[0.0; 6]; 3],
-        }; LEGS];
-        // Each quantity is distributed from its lanes to the four legs.
-        let mut scatter = |x: Quad, element: fn(&mut LegDynamics, usize, usize) -> &mut f64, i: usize, j: usize| {
-            for (leg, x) in out.iter_mut().zip(x.0) {
-                *element(leg, i, j) = x;
-            }
-        };
-        let legs = &self.legs;
-        scatter(legs.hip.cos, |leg, _, _| &mut leg.hip.cos, 0, 0);
-        scatter(legs.hip.sin, |leg, _, _| &mut leg.hip.sin, 0, 0);
-        scatter(legs.thigh.cos, |leg, _, _| &mut leg.thigh.cos, 0, 0);
-        scatter(legs.thigh.sin, |leg, _, _| &mut leg.thigh.sin, 0, 0);
-        scatter(legs.calf.cos, |leg, _, _| &mut leg.calf.cos, 0, 0);
-        scatter(legs.calf.sin, |leg, _, _| &mut leg.calf.sin, 0, 0);
-        for j in 0..3 {
-            for k in 0..3 {
-                scatter(legs.origin_body[j][k], |leg, j, k| &mut leg.origin_body[j][k], j, k);
-            }
-            for k in 0..6 {
-                scatter(legs.gain[j][k], |leg, j, k| &mut leg.gain[j][k], j, k);
-            }
-        }
-        for (n, (i, j)) in [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)].into_iter().enumerate() {
-            scatter(legs.factor_inverse[n], |leg, i, j| &mut leg.factor_inverse[(i, j)], i, j);
-        }
-        out
+    pub fn legs(&self) -> PerLeg<LegLinks> {
+        LegLinks::of(&self.legs.factors, self.link_rotations())
+    }
+
+    /// Factors of all legs.
+    pub fn leg_factors(&self) -> &LegFactors<Quad> {
+        &self.legs.factors
+    }
+
+    /// Rotations of thigh and calf of all legs about the hip link's y.
+    pub fn link_rotations(&self) -> [AxisRotation<Quad>; 2] {
+        [self.legs.thigh, self.legs.calf]
+    }
+
+    /// Instructions with which the equations are evaluated.
+    pub fn instructions(&self) -> Level {
+        self.instructions
     }
 
     /// F of one leg: a column for each joint.

@@ -1,4 +1,4 @@
-//! One number per leg, computed for all legs at once with the widest instructions of the processor.
+//! One number per leg, or per contact, computed for all four at once with the widest instructions of the processor.
 //!
 //! Every operation is rounded on its own: no multiplication is fused with an addition, and the results have the same bits with all
 //! instructions and on all machines.
@@ -8,6 +8,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x4, u64x4};
+use nalgebra::Vector3;
 
 use super::spatial::{AxisRotation, Real};
 use crate::robot::PerLeg;
@@ -20,6 +21,11 @@ pub(super) struct Quad(pub PerLeg<f64>);
 impl Quad {
     /// Zero for every leg.
     pub const ZERO: Quad = Quad([0.0; 4]);
+
+    /// One vector per leg as a vector of lanes.
+    pub fn vectors(v: &PerLeg<Vector3<f64>>) -> Vector3<Quad> {
+        Vector3::from_fn(|i, _| Quad(v.map(|v| v[i])))
+    }
 }
 
 /// One number per leg in registers.
@@ -70,6 +76,12 @@ impl<S: Simd> Lanes<S> {
         Lanes::new(simd, x.0)
     }
 
+    /// Loads the vectors of the legs.
+    #[inline(always)]
+    pub fn vector(simd: S, v: &Vector3<Quad>) -> Vector3<Self> {
+        Vector3::new(Lanes::load(simd, v.x), Lanes::load(simd, v.y), Lanes::load(simd, v.z))
+    }
+
     /// Stores the numbers of the legs.
     #[inline(always)]
     pub fn store(self) -> Quad {
@@ -81,6 +93,17 @@ impl<S: Simd> Lanes<S> {
     pub fn sum(self) -> f64 {
         let [a, b, c, d]: PerLeg<f64> = self.0.into();
         (a + b) + (c + d)
+    }
+
+    /// Size of `self` with the sign of `sign`.
+    #[inline(always)]
+    pub fn copysign(self, sign: Self) -> Self {
+        Lanes(self.0.copysign(sign.0))
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Lanes(self.0.abs())
     }
 
     #[inline(always)]

@@ -16,6 +16,7 @@ mod flight;
 mod integrate;
 mod joint_stop;
 mod lanes;
+mod leg;
 mod model;
 mod motion;
 mod quantities;
@@ -145,7 +146,7 @@ impl Simulator {
     /// Smallest distance between the robot and the ground, m; negative if a part is inside.
     pub fn smallest_gap(&self) -> f64 {
         let dynamics = Dynamics::new(&self.model, &self.state, &[0.0; JOINTS]);
-        self.collider.smallest_gap(&dynamics.legs(), &self.state, &self.terrain)
+        self.collider.smallest_gap(&dynamics, &self.state, &self.terrain)
     }
 
     /// Number of contact points of the last step.

@@ -42,7 +42,7 @@ impl RobotModel {
             mass: trunk.mass + links.map(|body| body.mass).sum::<f64>(),
             trunk,
             legs: LegsModel {
-                joint_origin: [0, 1, 2].map(|i| vector_lanes(&legs.each_ref().map(|leg| leg.joint_origin[i]))),
+                joint_origin: [0, 1, 2].map(|i| Quad::vectors(&legs.each_ref().map(|leg| leg.joint_origin[i]))),
                 inertia: [0, 1, 2].map(|i| inertia_lanes(&legs.each_ref().map(|leg| inertia(&leg.bodies[i])))),
             },
             foot_origin: legs.each_ref().map(|leg| leg.foot_origin),
@@ -70,16 +70,11 @@ impl RobotModel {
     }
 }
 
-/// Returns one vector per leg as a vector of lanes.
-fn vector_lanes(v: &PerLeg<Vector3<f64>>) -> Vector3<Quad> {
-    Vector3::from_fn(|i, _| Quad(v.map(|v| v[i])))
-}
-
 fn inertia_lanes(i: &PerLeg<SpatialInertia<f64>>) -> SpatialInertia<Quad> {
     let lanes = |f: fn(&SymmetricMatrix<f64>) -> f64| Quad(i.each_ref().map(|i| f(&i.second)));
     SpatialInertia {
         mass: Quad(i.map(|i| i.mass)),
-        first: vector_lanes(&i.map(|i| i.first)),
+        first: Quad::vectors(&i.map(|i| i.first)),
         second: SymmetricMatrix {
             xx: lanes(|s| s.xx),
             xy: lanes(|s| s.xy),

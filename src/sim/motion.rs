@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::dynamics::{Dynamics, LegDynamics};
+use super::dynamics::Dynamics;
 use super::six::{Six, stack};
 use super::state::SimState;
 use super::terrain::Terrain;
@@ -31,10 +31,11 @@ impl GeneralizedVelocity {
 /// One time step before its constraint impulses are known.
 pub(super) struct StepContext<'a> {
     pub dynamics: &'a Dynamics,
-    pub legs: &'a PerLeg<LegDynamics>,
     pub state: &'a SimState,
     pub terrain: &'a Terrain,
     pub world_from_body: &'a Matrix3<f64>,
+    /// Velocity at the start of the step.
+    pub velocity: &'a GeneralizedVelocity,
     /// Velocity at the end of the step without constraint impulses.
     pub free_velocity: &'a GeneralizedVelocity,
     /// Length of the step, s.

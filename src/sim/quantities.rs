@@ -129,7 +129,7 @@ impl RobotModel {
         std::array::from_fn::<_, LEGS, _>(|l| {
             let leg = &legs[l];
             let foot_body = leg.in_body(2, &self.foot_origin[l]);
-            let joints = leg.point_jacobian(2, &foot_body);
+            let joints = leg.calf_jacobian(&foot_body);
             // Velocity of a point p of the trunk: v + w x p.
             let mut jacobian_world = SMatrix::<f64, 3, DOF>::zeros();
             jacobian_world.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_world);

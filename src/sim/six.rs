@@ -2,6 +2,8 @@
 
 use nalgebra::{Scalar, Vector3};
 
+use super::spatial::Real;
+
 /// A six-vector. A plain array, which the compiler vectorizes.
 pub(super) type Six = [f64; 6];
 
@@ -72,13 +74,14 @@ impl Cholesky6 {
         Cholesky6 { columns: a, diagonal_inverse }
     }
 
-    /// Replaces x by L^-1 x.
+    /// Replaces x by L^-1 x; of lanes, each by its own.
     #[inline(always)]
-    pub fn solve_lower(&self, x: &mut Six) {
+    pub fn solve_lower<T: Real>(&self, x: &mut [T; 6]) {
         for j in 0..6 {
-            x[j] *= self.diagonal_inverse[j];
-            for i in j + 1..6 {
-                x[i] -= self.columns[j][i] * x[j];
+            let solved = x[j] * x[j].splat(self.diagonal_inverse[j]);
+            x[j] = solved;
+            for (x, l) in x[j + 1..].iter_mut().zip(&self.columns[j][j + 1..]) {
+                *x -= solved.splat(*l) * solved;
             }
         }
     }

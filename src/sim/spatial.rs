@@ -28,6 +28,12 @@ pub(super) fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
     Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
+/// a . b. (nalgebra's is not inlined for lanes.)
+#[inline(always)]
+pub(super) fn inner<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> T {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
+
 /// Rotation about one coordinate axis, as cosine and sine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AxisRotation<T> {

@@ -95,8 +95,15 @@ impl Simulator {
         self.solver.start(h);
         let world_from_body = self.state.world_from_body.to_rotation_matrix().into_inner();
         let (dynamics, state, terrain) = (&self.dynamics, &self.state, &self.terrain);
-        let legs = &dynamics.legs();
-        let step = StepContext { dynamics, legs, state, terrain, world_from_body: &world_from_body, free_velocity, h };
+        let step = StepContext {
+            dynamics,
+            state,
+            terrain,
+            world_from_body: &world_from_body,
+            velocity: &GeneralizedVelocity::of(state),
+            free_velocity,
+            h,
+        };
         self.collider.find(&step, &mut self.solver);
         add_joint_constraints(&mut self.solver, &step, &self.limits, dry_friction);
         world_from_body

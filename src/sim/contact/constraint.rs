@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::law::LocalProblem;
 use crate::robot::LEGS;
+use crate::sim::config::ContactLaw;
 use crate::sim::six::{Six, add_scaled, dot};
 use crate::sim::terrain::LooseBlock;
 
@@ -81,6 +82,22 @@ impl JointConstraint {
 }
 
 impl ContactConstraint {
+    /// Memory for a contact under `law`.
+    pub(super) fn new(law: ContactLaw) -> ContactConstraint {
+        ContactConstraint {
+            leg: 0,
+            warm_start_slot: 0,
+            on_block: None,
+            axes_body: Matrix3::identity(),
+            trunk_rows: [[0.0; 6]; 3],
+            leg_rows: Matrix3::zeros(),
+            rhs: Vector3::zeros(),
+            local: LocalProblem::new(law, 0.0, Matrix3::identity(), Matrix3::identity()),
+            impulse: Vector3::zeros(),
+            impulse_world: Vector3::zeros(),
+        }
+    }
+
     /// Velocity less the velocity that may remain: W y_0 + U y_l + rhs.
     #[inline]
     pub(super) fn velocity(&self, sums: &ImpulseSums) -> Vector3<f64> {

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::sim::config::ContactLaw;
+use crate::sim::spatial::Real;
 
 /// One contact in the coordinates normal, tangent, tangent.
 #[derive(Debug, Clone, Copy)]
@@ -17,8 +18,8 @@ pub(super) struct LocalProblem {
 }
 
 impl LocalProblem {
-    pub fn new(law: ContactLaw, friction: f64, delassus: Matrix3<f64>) -> LocalProblem {
-        LocalProblem { law, friction, delassus, delassus_inverse: symmetric_inverse(&delassus), slip_ratio: 0.0 }
+    pub fn new(law: ContactLaw, friction: f64, delassus: Matrix3<f64>, delassus_inverse: Matrix3<f64>) -> LocalProblem {
+        LocalProblem { law, friction, delassus, delassus_inverse, slip_ratio: 0.0 }
     }
 
     /// Returns the impulse that satisfies the law while all other impulses stay, and the largest component of the change of the
@@ -143,15 +144,20 @@ pub(super) fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
     Vector3::new(impulse.x, impulse.y * limit / size, impulse.z * limit / size)
 }
 
-/// Returns the inverse of a symmetric positive matrix by cofactors.
-fn symmetric_inverse(m: &Matrix3<f64>) -> Matrix3<f64> {
-    let i11 = m.m22 * m.m33 - m.m23 * m.m23;
-    let i12 = m.m13 * m.m23 - m.m12 * m.m33;
-    let i13 = m.m12 * m.m23 - m.m13 * m.m22;
-    let i22 = m.m11 * m.m33 - m.m13 * m.m13;
-    let i23 = m.m12 * m.m13 - m.m11 * m.m23;
-    let i33 = m.m11 * m.m22 - m.m12 * m.m12;
-    let scale = 1.0 / (m.m11 * i11 + m.m12 * i12 + m.m13 * i13);
-    let (i11, i12, i13, i22, i23, i33) = (i11 * scale, i12 * scale, i13 * scale, i22 * scale, i23 * scale, i33 * scale);
-    Matrix3::new(i11, i12, i13, i12, i22, i23, i13, i23, i33)
+/// Returns the inverse of a symmetric positive matrix by cofactors; both by their elements 11, 12, 13, 22, 23, 33.
+#[inline(always)]
+pub(super) fn symmetric_inverse<T: Real>([m11, m12, m13, m22, m23, m33]: [T; 6]) -> [T; 6] {
+    let i11 = m22 * m33 - m23 * m23;
+    let i12 = m13 * m23 - m12 * m33;
+    let i13 = m12 * m23 - m13 * m22;
+    let i22 = m11 * m33 - m13 * m13;
+    let i23 = m12 * m13 - m11 * m23;
+    let i33 = m11 * m22 - m12 * m12;
+    let scale = m11.splat(1.0) / (m11 * i11 + m12 * i12 + m13 * i13);
+    [i11 * scale, i12 * scale, i13 * scale, i22 * scale, i23 * scale, i33 * scale]
+}
+
+/// Returns the symmetric matrix with the elements 11, 12, 13, 22, 23, 33.
+pub(super) fn symmetric([m11, m12, m13, m22, m23, m33]: [f64; 6]) -> Matrix3<f64> {
+    Matrix3::new(m11, m12, m13, m12, m22, m23, m13, m23, m33)
 }

@@ -23,34 +23,9 @@
 
 mod constraint;
 mod law;
+mod preparation;
 mod solver;
 mod sticking_leg;
 
-use nalgebra::{Matrix3, Vector3};
-
+pub(super) use preparation::{ContactCandidate, SPEED_MARGIN};
 pub(super) use solver::ContactSolver;
-
-/// A point that touches the ground or can within the step.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ContactPoint {
-    /// Leg of the point, or [`super::motion::TRUNK`].
-    pub leg: usize,
-    /// Index of its warm-start impulse.
-    pub warm_start_slot: usize,
-    /// Position, body axes, m.
-    pub position_body: Vector3<f64>,
-    /// Out of the ground, body axes.
-    pub normal_body: Vector3<f64>,
-    /// J_l: velocity of the point per joint velocity of its leg, body axes; zero for the trunk.
-    pub leg_jacobian: Matrix3<f64>,
-    /// Distance to the ground at the start of the step, m; negative inside.
-    pub gap: f64,
-    /// Coulomb coefficient.
-    pub friction: f64,
-    /// Velocity relative to the ground at the start of the step, body axes, m/s.
-    pub velocity_body: Vector3<f64>,
-    /// Velocity relative to the ground at the end of the step without constraint impulses, body axes, m/s.
-    pub free_velocity_body: Vector3<f64>,
-    /// Loose block under the point.
-    pub block: Option<usize>,
-}

@@ -2,15 +2,15 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::ContactPoint;
 use super::constraint::{ContactConstraint, ContactOnBlock, ImpulseSums, JointConstraint};
-use super::law::{LocalProblem, into_cone};
+use super::law::{LocalProblem, into_cone, symmetric, symmetric_inverse};
+use super::preparation::{ContactCandidate, ContactInput, LANES};
 use super::sticking_leg::StickingLeg;
 use crate::robot::{JOINTS, Joints, LEGS};
 use crate::sim::config::{ContactConfig, ContactLaw, SolverConfig};
 use crate::sim::dynamics::Dynamics;
-use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
-use crate::sim::six::{add_scaled, dot, stack};
+use crate::sim::motion::{GeneralizedVelocity, StepContext};
+use crate::sim::six::dot;
 use crate::sim::terrain::LooseBlock;
 
 /// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
@@ -29,13 +29,17 @@ pub(in crate::sim) struct ContactSolver {
     config: SolverConfig,
     law: ContactLaw,
     slip_time_s: f64,
+    /// Points near the ground that are no contacts yet, fewer than lanes.
+    candidates: Vec<ContactCandidate>,
+    /// Memory for the contacts; the first `contact_count` are those of this step.
     contacts: Vec<ContactConstraint>,
+    contact_count: usize,
     joint_rows: Vec<JointConstraint>,
     sticking_legs: Vec<StickingLeg>,
     on_blocks: Vec<ContactOnBlock>,
     /// Loose blocks under the contacts.
     loose_blocks: Vec<LooseBlock>,
-    /// Impulses of the last step in world axes, by [`ContactPoint::warm_start_slot`].
+    /// Impulses of the last step in world axes, by [`ContactCandidate::warm_start_slot`].
     warm_start: Vec<Option<Vector3<f64>>>,
     /// Slots of `warm_start` that hold an impulse.
     warm_slots: Vec<usize>,
@@ -49,7 +53,9 @@ impl ContactSolver {
     pub fn new(config: SolverConfig, contact: &ContactConfig, warm_start_slots: usize) -> ContactSolver {
         ContactSolver {
             config,
-            contacts: Vec::with_capacity(MAX_CONTACTS),
+            candidates: Vec::with_capacity(LANES),
+            contacts: vec![ContactConstraint::new(contact.law); MAX_CONTACTS + LANES],
+            contact_count: 0,
             joint_rows: Vec::with_capacity(MAX_JOINT_ROWS),
             sticking_legs: Vec::with_capacity(LEGS),
             on_blocks: Vec::with_capacity(MAX_CONTACTS),
@@ -78,19 +84,19 @@ impl ContactSolver {
     }
 
     fn clear(&mut self) {
-        self.contacts.clear();
+        self.contact_count = 0;
         self.joint_rows.clear();
         self.on_blocks.clear();
         self.loose_blocks.clear();
     }
 
     pub fn is_empty(&self) -> bool {
-        self.contacts.is_empty() && self.joint_rows.is_empty()
+        self.contact_count == 0 && self.joint_rows.is_empty()
     }
 
     /// The contacts of this step; their impulses are those of the last step until [`ContactSolver::solve`].
     pub fn contacts(&self) -> &[ContactConstraint] {
-        &self.contacts
+        &self.contacts[..self.contact_count]
     }
 
     /// The loose blocks under these contacts; they have the velocity of the end of the step after [`ContactSolver::solve`].
@@ -106,67 +112,61 @@ impl ContactSolver {
         share * gap / h
     }
 
-    /// Adds a contact.
-    pub fn add_point(&mut self, step: &StepContext, point: &ContactPoint) {
-        if self.contacts.len() == MAX_CONTACTS {
+    /// Adds a point near the ground; [`ContactSolver::add_contacts`] takes the last ones.
+    pub fn add_candidate(&mut self, step: &StepContext, candidate: ContactCandidate) {
+        self.candidates.push(candidate);
+        if self.candidates.len() == LANES {
+            self.add_contacts(step);
+        }
+    }
+
+    /// Adds the contacts of the candidates whose gap can close within the step.
+    pub fn add_contacts(&mut self, step: &StepContext) {
+        if self.candidates.is_empty() {
             return;
         }
-        let axes_body = axes_about(&point.normal_body);
-        // Rows of J_0: axis . (v + w x p) = axis . v + (p x axis) . w
-        let mut trunk_rows = [0, 1, 2].map(|i| {
-            let axis: Vector3<f64> = axes_body.column(i).into();
-            stack(&axis, &point.position_body.cross(&axis))
-        });
-        let mut leg_rows = Matrix3::zeros();
-        if point.leg != TRUNK {
-            // J_0 - J_l G  and  U = J_l C^-T
-            let leg = &step.legs[point.leg];
-            let jacobian = axes_body.tr_mul(&point.leg_jacobian);
-            for (i, row) in trunk_rows.iter_mut().enumerate() {
-                for (j, gain) in leg.gain.iter().enumerate() {
-                    add_scaled(row, gain, -jacobian[(i, j)]);
-                }
-            }
-            leg_rows = jacobian * leg.factor_inverse.transpose();
-        }
-        // W = (J_0 - J_l G) L^-T
-        for row in &mut trunk_rows {
-            step.dynamics.factor.solve_lower(row);
-        }
-        let [w1, w2, w3] = &trunk_rows;
-        let (a12, a13, a23) = (dot(w1, w2), dot(w1, w3), dot(w2, w3));
-        #[rustfmt::skip]
-        let trunk_part = Matrix3::new(
-            dot(w1, w1), a12,         a13,
-            a12,         dot(w2, w2), a23,
-            a13,         a23,         dot(w3, w3),
-        );
-        let delassus = trunk_part + leg_rows * leg_rows.transpose();
-        let mut rhs = axes_body.tr_mul(&point.free_velocity_body);
-        rhs.x += self.gap_velocity(point.gap, step.h);
-        if let ContactLaw::Convex = self.law {
-            let before = axes_body.tr_mul(&point.velocity_body);
-            rhs.y -= self.kept_slip * before.y;
-            rhs.z -= self.kept_slip * before.z;
-        }
-
-        let warm_start = match self.warm_start[point.warm_start_slot] {
-            Some(impulse_world) => axes_body.tr_mul(&step.world_from_body.tr_mul(&impulse_world)),
-            None => Vector3::zeros(),
+        // Lanes without a candidate repeat the first one.
+        let candidates: [&ContactCandidate; LANES] =
+            std::array::from_fn(|i| self.candidates.get(i).unwrap_or(&self.candidates[0]));
+        let ground_velocity = |block| step.terrain.block_velocity(block);
+        let input = ContactInput {
+            law: self.law,
+            ground_velocity_world: candidates.map(|c| c.ground.block.map_or(Vector3::zeros(), ground_velocity)),
+            warm_start_world: candidates.map(|c| self.warm_start[c.warm_start_slot].unwrap_or_default()),
+            gap_velocity: candidates.map(|c| self.gap_velocity(c.ground.gap, step.h)),
+            kept_slip: match self.law {
+                ContactLaw::Coulomb => 0.0,
+                ContactLaw::Convex => self.kept_slip,
+            },
+            candidates,
         };
-        let on_block = point.block.map(|block| self.add_on_block(step, block, axes_body, delassus, point.friction));
-        self.contacts.push(ContactConstraint {
-            leg: point.leg,
-            warm_start_slot: point.warm_start_slot,
-            on_block,
-            axes_body,
-            trunk_rows,
-            leg_rows,
-            rhs,
-            local: LocalProblem::new(self.law, point.friction, delassus),
-            impulse: into_cone(&warm_start, point.friction),
-            impulse_world: Vector3::zeros(),
-        });
+        // There is room for them behind the last contact.
+        let first = self.contact_count;
+        let Some(rows) = self.contacts[first..].first_chunk_mut::<LANES>() else { return self.candidates.clear() };
+        let closest_gap = input.prepare(step, rows);
+        for (lane, gap) in closest_gap.into_iter().enumerate().take(self.candidates.len()) {
+            if gap <= 0.0 && self.contact_count < MAX_CONTACTS {
+                self.keep_contact(step, lane, first + lane);
+            }
+        }
+        self.candidates.clear();
+    }
+
+    /// Takes the prepared contact `prepared` of the candidate `lane` as the next one.
+    fn keep_contact(&mut self, step: &StepContext, lane: usize, prepared: usize) {
+        let ContactCandidate { leg, warm_start_slot, ground, .. } = self.candidates[lane];
+        let next = self.contact_count;
+        if next != prepared {
+            self.contacts[next] = self.contacts[prepared];
+        }
+        let contact = &mut self.contacts[next];
+        contact.leg = leg;
+        contact.warm_start_slot = warm_start_slot;
+        contact.impulse = into_cone(&contact.impulse, ground.friction);
+        let (axes_body, delassus) = (contact.axes_body, contact.local.delassus);
+        let on_block = ground.block.map(|block| self.add_on_block(step, block, axes_body, delassus, ground.friction));
+        self.contacts[next].on_block = on_block;
+        self.contact_count += 1;
     }
 
     /// Adds the part of a contact that concerns its loose block `index`; returns its index.
@@ -186,7 +186,9 @@ impl ContactSolver {
         // A block moves in the world's horizontal plane.
         let horizontal = axes_world.fixed_rows::<2>(0);
         let with_block = delassus + horizontal.tr_mul(&horizontal) * self.loose_blocks[block].mobility();
-        let sliding = LocalProblem::new(self.law, friction, with_block);
+        let m = &with_block;
+        let inverse = symmetric(symmetric_inverse([m.m11, m.m12, m.m13, m.m22, m.m23, m.m33]));
+        let sliding = LocalProblem::new(self.law, friction, with_block, inverse);
         self.on_blocks.push(ContactOnBlock { block, axes_world, sliding });
         self.on_blocks.len() - 1
     }
@@ -209,12 +211,10 @@ impl ContactSolver {
 
     fn add_joint(&mut self, step: &StepContext, joint: usize, sign: f64, rhs: f64, bounds: [f64; 2]) {
         let (leg, part) = (joint / 3, joint % 3);
-        let mut u = Vector3::zeros();
-        u[part] = sign;
-        let l = &step.legs[leg];
-        let mut trunk_row = l.gain[part].map(|g| -sign * g);
+        let factors = step.dynamics.leg_factors();
+        let mut trunk_row = factors.gain_of(leg, part).map(|g| -sign * g);
         step.dynamics.factor.solve_lower(&mut trunk_row);
-        let leg_row = l.factor_inverse * u;
+        let leg_row = factors.factor_column(leg, part) * sign;
         let delassus = dot(&trunk_row, &trunk_row) + leg_row.norm_squared();
         let [lowest, highest] = bounds;
         let (friction_of, impulse) = (None, 0.0);
@@ -238,7 +238,7 @@ impl ContactSolver {
             let is_own = |contact: &ContactConstraint| contact.leg == leg && contact.on_block.is_none();
             let row = |part| self.joint_rows.iter().position(|row| row.friction_of == Some(3 * leg + part));
             if let (Some(a), Some(b), Some(c)) = (row(0), row(1), row(2))
-                && let Some(contact) = self.contacts.iter().position(is_own)
+                && let Some(contact) = self.contacts().iter().position(is_own)
             {
                 self.sticking_legs.push(StickingLeg::new(contact, [a, b, c]));
             }
@@ -248,7 +248,9 @@ impl ContactSolver {
     /// Solves for all impulses; returns the change of velocity that they make.
     pub fn solve(&mut self, dynamics: &Dynamics, world_from_body: &Matrix3<f64>) -> GeneralizedVelocity {
         let mut sums = ImpulseSums { trunk: [0.0; 6], legs: [Vector3::zeros(); LEGS + 1] };
-        for contact in &self.contacts {
+        self.find_sticking_legs();
+        let contacts = &mut self.contacts[..self.contact_count];
+        for contact in contacts.iter() {
             contact.add(&mut sums, &contact.impulse);
             if let Some(on_block) = contact.on_block.map(|i| &self.on_blocks[i]) {
                 self.loose_blocks[on_block.block].push(&-(on_block.axes_world * contact.impulse));
@@ -257,16 +259,15 @@ impl ContactSolver {
         for row in &self.joint_rows {
             row.add(&mut sums, row.impulse);
         }
-        self.find_sticking_legs();
         for sweep in 0..self.config.max_sweeps {
             if sweep < FLOOR_SWEEPS {
                 self.loose_blocks.iter_mut().for_each(LooseBlock::limit_floor_friction);
             }
             let mut change: f64 = 0.0;
             for leg in &mut self.sticking_legs {
-                leg.solve(&mut self.contacts, &mut self.joint_rows, &mut sums);
+                leg.solve(contacts, &mut self.joint_rows, &mut sums);
             }
-            for contact in &mut self.contacts {
+            for contact in contacts.iter_mut() {
                 let on_block = contact.on_block.map(|i| &mut self.on_blocks[i]);
                 change = change.max(contact.solve(&mut sums, on_block, &mut self.loose_blocks));
             }
@@ -284,7 +285,7 @@ impl ContactSolver {
         for slot in self.warm_slots.drain(..) {
             self.warm_start[slot] = None;
         }
-        for contact in &mut self.contacts {
+        for contact in contacts.iter_mut() {
             contact.impulse_world = world_from_body * (contact.axes_body * contact.impulse);
             self.warm_start[contact.warm_start_slot] = Some(contact.impulse_world);
             self.warm_slots.push(contact.warm_start_slot);
@@ -301,19 +302,4 @@ impl ContactSolver {
         let legs = dynamics.joint_change(&[fr, fl, rr, rl], &trunk);
         GeneralizedVelocity { trunk, legs }
     }
-}
-
-/// Returns the normal and two tangents as columns (Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1),
-/// 2017).
-fn axes_about(n: &Vector3<f64>) -> Matrix3<f64> {
-    let sign = 1.0_f64.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    #[rustfmt::skip]
-    let axes = Matrix3::new(
-        n.x, 1.0 + sign * n.x * n.x * a, b,
-        n.y, sign * b,                   sign + n.y * n.y * a,
-        n.z, -sign * n.x,                -n.y,
-    );
-    axes
 }
