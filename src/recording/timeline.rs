@@ -25,6 +25,8 @@ pub struct TrialRun {
     pub row_ns: u64,
     /// Begin of the impulse; none where the recording has no changes of mode.
     pub impulse_ns: Option<u64>,
+    /// Its first tick with damped joints; none of a trial that was not stopped.
+    pub damped_ns: Option<u64>,
     /// Its end: the review, its row, or the next trial, ns.
     pub end_ns: u64,
 }
@@ -195,7 +197,7 @@ impl Timeline {
         let mut ended = vec![false; begins.len()];
         for (index, &(trial, begin_ns)) in begins.iter().enumerate() {
             let end_ns = begins.get(index + 1).map_or(duration_ns, |next| next.1);
-            spans.push(TrialRun { trial, begin_ns, row_ns: begin_ns, impulse_ns: None, end_ns });
+            spans.push(TrialRun { trial, begin_ns, row_ns: begin_ns, impulse_ns: None, damped_ns: None, end_ns });
         }
         for part in &self.parts {
             for event in part.player.events() {
@@ -204,8 +206,14 @@ impl Timeline {
                     continue;
                 };
                 let span = &mut spans[index];
-                if matches!(&event.record, Record::Transition(change) if change.to == Mode::Jump) {
-                    span.impulse_ns.get_or_insert(time_ns);
+                if let Record::Transition(change) = &event.record
+                    && !ended[index]
+                {
+                    match change.to {
+                        Mode::Jump => _ = span.impulse_ns.get_or_insert(time_ns),
+                        Mode::Damped => _ = span.damped_ns.get_or_insert(time_ns),
+                        _ => {}
+                    }
                 }
                 if let Record::Stage(StageRecord { stage: ExperimentStage::Running, trial, .. }) = event.record
                     && trial == span.trial

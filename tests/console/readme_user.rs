@@ -68,7 +68,7 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus::default()));
     let best = |console: &mut Console, best| {
-        let trials = TrialRun { trial: 7, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+        let trials = TrialRun { trial: 7, begin_ns: 1, row_ns: 1, impulse_ns: None, damped_ns: None, end_ns: 2 };
         let timeline = ReplayTimeline { trials: vec![trials], best, ..ReplayTimeline::default() };
         console.update(Msg::Timeline(Box::new(timeline)));
         console.press(&["G", "b", "e", "s", "t", "Enter"])
@@ -88,7 +88,14 @@ fn the_best_of_a_replay_is_that_of_the_recording() {
 fn a_trial_that_waits_for_its_verdict_has_none_on_the_timeline() {
     let mut console = Console::ready();
     let row = TrialRecord { verdict: None, ..trial(7, None, Some(Verdict::Accept)) };
-    let run = TrialRun { trial: 7, begin_ns: 1_000_000_000, row_ns: 1, impulse_ns: None, end_ns: 8_000_000_000 };
+    let run = TrialRun {
+        trial: 7,
+        begin_ns: 1_000_000_000,
+        row_ns: 1,
+        impulse_ns: None,
+        damped_ns: None,
+        end_ns: 8_000_000_000,
+    };
     console.update(Msg::Replay(ReplayStatus { duration_ns: 10_000_000_000, ..ReplayStatus::default() }));
     let timeline = ReplayTimeline { trials: vec![run], rows: [(7, row)].into(), ..ReplayTimeline::default() };
     console.update(Msg::Timeline(Box::new(timeline)));
@@ -106,6 +113,7 @@ fn the_timeline_has_the_verdict_of_the_table_until_the_playhead() {
         begin_ns: begin_s * 1_000_000_000,
         row_ns: 1,
         impulse_ns: None,
+        damped_ns: None,
         end_ns: (begin_s + 1) * 1_000_000_000,
     };
     let changed = |number| (number, trial(number, Some(Verdict::Void), None));
@@ -148,7 +156,7 @@ fn frozen_charts_of_a_replay_end_where_the_playhead_goes_elsewhere() {
 fn a_bare_number_says_what_it_was_taken_for() {
     let mut console = Console::ready();
     console.update(Msg::Replay(ReplayStatus { duration_ns: 20_000_000_000, ..ReplayStatus::default() }));
-    let run = TrialRun { trial: 12, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+    let run = TrialRun { trial: 12, begin_ns: 1, row_ns: 1, impulse_ns: None, damped_ns: None, end_ns: 2 };
     console.update(Msg::Timeline(Box::new(ReplayTimeline { trials: vec![run], ..ReplayTimeline::default() })));
     let effects = console.press(&["G", "1", "2", "Enter"]);
     assert_eq!(effects, [Effect::Replay(ReplayCommand::Time(12_000_000_000))]);
@@ -367,7 +375,7 @@ fn the_details_of_a_replay_are_those_of_the_whole_recording() {
     console.stage(ExperimentStage::Running, 4);
     let judged = TrialRecord { cause: "landed and settled".into(), ..trial(4, Some(Verdict::Accept), None) };
     let later = trial(5, Some(Verdict::Fall), None);
-    let span = TrialRun { trial: 4, begin_ns: 1, row_ns: 1, impulse_ns: None, end_ns: 2 };
+    let span = TrialRun { trial: 4, begin_ns: 1, row_ns: 1, impulse_ns: None, damped_ns: None, end_ns: 2 };
     let rows = [judged, later].into_iter().map(|row| (row.trial, row)).collect();
     let timeline = ReplayTimeline { trials: vec![span], rows, ..ReplayTimeline::default() };
     console.update(Msg::Timeline(Box::new(timeline)));

@@ -9,6 +9,7 @@ use crate::pty::Session;
 use crate::python_reader::read_by_python;
 use crate::skip::skip;
 use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::{Record, Stamped};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Mode;
 use serde_json::Value;
@@ -160,6 +161,31 @@ fn a_study_without_a_screen_records_the_topics_of_the_console() {
 }
 
 /// The text of an attachment.
+/// Regression: a change of mode had the time of the tick before it.
+#[test]
+fn a_change_of_mode_has_the_time_of_its_first_tick() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "6", "--seed", "0", "--record", "all"]);
+    let file = program.study("recordings").join("session.mcap");
+    let (mut mode, mut of_ticks, mut recorded) = (Mode::Ready, Vec::new(), Vec::new());
+    for played in Player::open(&file).unwrap() {
+        match played {
+            Played::Tick(tick) if tick.mode != mode => {
+                mode = tick.mode;
+                of_ticks.push((tick.time_ns, mode));
+            }
+            Played::Record(Stamped { time_ns, record: Record::Transition(change) }) => {
+                recorded.push((time_ns, change.to));
+            }
+            _ => {}
+        }
+    }
+    // The robot of a study without a screen stands at the begin of each trial: that is no change.
+    of_ticks.retain(|(_, mode)| *mode != Mode::Ready);
+    assert!(recorded.iter().any(|(_, mode)| *mode == Mode::Damped), "{recorded:?}");
+    assert_eq!(recorded, of_ticks);
+}
+
 fn attached<'a>(found: &'a Value, name: &str) -> &'a str {
     found["attachments"][name].as_str().unwrap_or_else(|| panic!("no {name}: {:?}", found["attachments"]))
 }

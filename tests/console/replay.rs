@@ -50,6 +50,15 @@ fn falls() -> Vec<u32> {
     rows.values().filter(|row| row.verdict.or(row.suggested) == Some(Verdict::Fall)).map(|row| row.trial).collect()
 }
 
+/// Time of the first tick of a trial with damped joints.
+fn first_damped(trial: u32) -> u64 {
+    let damped = |played: Played| match played {
+        Played::Tick(tick) if tick.mode == Mode::Damped && tick.trial == Some(trial) => Some(tick.time_ns),
+        _ => None,
+    };
+    timeline().find_map(damped).unwrap()
+}
+
 /// A time as the frame shows it.
 fn shown(time_ns: u64) -> String {
     let ms = time_ns / 1_000_000;
@@ -203,12 +212,16 @@ fn keys_step_by_a_tick_a_sample_and_a_second_and_find_falls() {
         session.send(key);
         session.wait_for(&[time]);
     }
-    // Regression: they led to the countdown of the trial that fell, and within that trial nowhere.
-    let fallen = |trial| shown(span(trial).end_ns - 1_000_000);
+    // Regression: they led to the countdown of the trial that fell, and within that trial nowhere; then to ticks after the fall, whose
+    // pitch was not the one of its cause.
+    let fallen = |trial| shown(first_damped(trial));
     session.send("(");
     for trial in falls() {
         session.send("}");
-        session.wait_for(&[&fallen(trial)]);
+        // The pitch beside the cause is the one that it names.
+        let cause = timeline().rows()[&trial].cause.clone();
+        let pitch = cause.split_once("pitch ").and_then(|(_, rest)| rest.get(..4)).unwrap_or(&cause);
+        session.wait_for(&[&fallen(trial), &format!("pitch +{pitch}")]);
     }
     // After the last one it stays there and says so.
     session.send("}");
@@ -237,7 +250,7 @@ fn a_fault_that_ends_a_trial_is_one_place() {
         timeline.markers().iter().filter(|m| m.kind == MarkerKind::Fault).map(|m| m.time_ns).collect();
     let place = |run: &TrialRun| {
         let fault = faults.iter().find(|fault| (run.begin_ns..=run.end_ns).contains(fault));
-        (fault.copied().unwrap_or(run.end_ns - 1_000_000), fault.is_some())
+        (fault.copied().or(run.damped_ns).unwrap(), fault.is_some())
     };
     let fell = |run: &&TrialRun| rows[&run.trial].verdict == Some(Verdict::Fall);
     let places: Vec<(u64, bool)> = timeline.trials().iter().filter(fell).map(place).collect();

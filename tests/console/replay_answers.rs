@@ -1,4 +1,4 @@
-//! What a replay says: the answers to the keys of who watches it, and what the operator of the session was told.
+//! The message line of a replay: answers to the keys of who watches it, and what the operator of the session was told.
 
 use std::path::PathBuf;
 
@@ -63,7 +63,7 @@ fn a_replay_names_the_operator_in_an_answer_that_he_got() {
     assert_eq!(live.said(), "fall: trial 3; u takes it back");
 }
 
-/// Who watches a robot that moves sees at once what its session says.
+/// An observer of a robot that moves sees at once what its session says.
 #[test]
 fn an_answer_to_an_observer_does_not_hide_the_session() {
     let mut console = Console::ready();

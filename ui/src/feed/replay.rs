@@ -222,13 +222,13 @@ impl ReplayFeed {
         run.map_or(marker.time_ns, |run| run.row_ns)
     }
 
-    /// Begins of faults and last ticks of trials that fell without one, in the order of time.
+    /// Begins of faults, and of trials that fell without one the ticks that stopped them or their last ones, in the order of time.
     fn falls(&self) -> impl DoubleEndedIterator<Item = u64> + use<> {
         let faults = self.recording.markers().iter().filter(|marker| marker.kind == MarkerKind::Fault);
         let mut places: Vec<u64> = faults.map(|marker| marker.time_ns).collect();
         let ended_by_fault = |run: &&TrialRun| places.iter().any(|fault| (run.begin_ns..=run.end_ns).contains(fault));
         let fell = self.whole.trials.iter().filter(|run| self.whole.falls.contains(&run.trial));
-        let fell: Vec<u64> = fell.filter(|run| !ended_by_fault(run)).map(last_tick).collect();
+        let fell: Vec<u64> = fell.filter(|run| !ended_by_fault(run)).map(fall_tick).collect();
         places.extend(fell);
         places.sort_unstable();
         places.into_iter()
@@ -443,9 +443,9 @@ fn before(times: impl DoubleEndedIterator<Item = u64>, time_ns: u64) -> Option<u
     times.rev().find(|time| *time < time_ns)
 }
 
-/// At the end itself the next trial may have begun.
-fn last_tick(run: &TrialRun) -> u64 {
-    run.end_ns.saturating_sub(TICK_NS).max(run.begin_ns)
+/// The tick in which a trial was stopped, or its last one: at the end itself the next trial may have begun.
+fn fall_tick(run: &TrialRun) -> u64 {
+    run.damped_ns.unwrap_or_else(|| run.end_ns.saturating_sub(TICK_NS).max(run.begin_ns))
 }
 
 /// The begin of a loop: shortly before the impulse, or the begin of a trial whose impulse is not recorded as an event.

@@ -179,7 +179,7 @@ pub struct Model {
     /// The jumps of the running trial.
     pub jump_series: JumpSeries,
     pub message: Option<Notice>,
-    /// What a replayed session has said while an answer to a key of this console is being read.
+    /// Message of a replayed session that waits until the answer to a key of this console is read.
     pub message_after_answer: Option<Notice>,
     pub view: View,
     pub dialog: Option<Dialog>,

@@ -64,10 +64,10 @@ impl StudyRecorder {
         let start_ns = self.time_ns;
         let mut transitions = rollout.transitions.iter().peekable();
         for tick in &rollout.ticks {
+            self.time_ns = start_ns + tick.time_ns;
             while let Some((_, transition)) = transitions.next_if(|(time_ns, _)| *time_ns <= tick.time_ns) {
                 self.record(Record::Transition(transition.clone()))?;
             }
-            self.time_ns = start_ns + tick.time_ns;
             if self.time_ns >= self.counters_ns {
                 // Simulated time: no tick is late and none is lost.
                 self.record(Record::Counters(Counters::default()))?;
