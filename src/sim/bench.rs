@@ -1,9 +1,10 @@
 //! Speed of the simulator, for `benches/simulator.rs` and `quadfrog bench`.
 //!
-//! A step with four contacts and three sweeps takes 11,600 floating-point operations, a step of flight 7,600 (callgrind). On a core of an
-//! EPYC (2.6 GHz) that has AVX2 they take 1.27 us and 0.84 us: 9.1 and 9.0 Gflop/s, 44 % and 43 % of the 20.8 Gflop/s that two additions
-//! or multiplications of four lanes per cycle give. The rest is data movement between lanes and legs, and the contacts, which are computed
-//! one after the other. MuJoCo's standing step took 10.6 us there, 8.2 to 8.5 times as long (`quadfrog bench --mujoco FILE`).
+//! A step with four contacts and three sweeps takes 10,700 floating-point operations, a step of flight 7,500 (each instruction of a step
+//! counted by a debugger). On a core of a Xeon (3.7 GHz) that has AVX2 they take 0.91 us and 0.63 us: 11.8 and 11.9 Gflop/s, 40 % of the
+//! 29.4 Gflop/s that two additions or multiplications of four lanes per cycle give. The rest is data movement between lanes and legs, and
+//! the sweeps, which take one contact after the other. MuJoCo's standing step took 9.0 us there, 10.1 to 10.8 times as long (`quadfrog
+//! bench --mujoco FILE`).
 
 use std::time::Instant;
 
