@@ -4,7 +4,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{GRAVITY, JointCommand, Robot};
-use quadfrog::sim::{ActuatorKind, SimConfig, SimState, Simulator};
+use quadfrog::sim::{ActuatorKind, ContactLaw, SimConfig, SimState, Simulator, TerrainKind};
 
 /// A limp robot that tumbles high up, without joint stops.
 fn tumbling(flight_substeps: u32) -> Simulator {
@@ -114,10 +114,24 @@ fn a_run_repeats_bit_for_bit() {
 /// A robot that tumbles, falls on its legs and its trunk, and is moved by its motors, with dry friction and lag in its joints.
 #[test]
 fn the_widest_and_the_baseline_instructions_give_the_same_bits() {
-    let robot = RobotDescription::embedded("go1").unwrap();
     let mut config = SimConfig::default();
     config.actuator.kind = ActuatorKind::HardwareLike;
-    let mut wide = Simulator::new(&robot, &config).unwrap();
+    wide_and_baseline_are_equal(&config);
+}
+
+/// The same on blocks that slide under the robot, with the convex contact law.
+#[test]
+fn the_widest_and_the_baseline_instructions_give_the_same_bits_on_loose_blocks() {
+    let mut config = SimConfig::default();
+    config.contact.law = ContactLaw::Convex;
+    config.terrain.kind = TerrainKind::Blocks;
+    config.terrain.blocks.loose = true;
+    wide_and_baseline_are_equal(&config);
+}
+
+fn wide_and_baseline_are_equal(config: &SimConfig) {
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let mut wide = Simulator::new(&robot, config).unwrap();
     wide.set_state(&SimState { position_world: Vector3::new(0.0, 0.0, 1.5), ..*tumbling(1).state() });
     let mut baseline = wide.clone().with_baseline_instructions();
     let bits = |simulator: &Simulator| {
