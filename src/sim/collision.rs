@@ -348,7 +348,7 @@ impl Collider {
             let lowest = heights[bounds.link] + inner(up, &Lanes::vector(simd, &bounds.center))
                 - depth
                 - Lanes::load(simd, bounds.radius);
-            // What is left out is left out without rounding, too.
+            // More than the rounding by which the heights of single bounds differ from these.
             links_are_near |= lowest.store().0.iter().any(|gap| *gap <= reach + 1e-9);
         }
         let [x, y, z] = [foot_body.x.store().0, foot_body.y.store().0, foot_body.z.store().0];
