@@ -180,6 +180,23 @@ fn with_two_jumps() -> Console {
     console
 }
 
+/// Regression: while Live showed the joints or the robot in place of the charts, two compared trials were nowhere to be seen.
+#[test]
+fn a_comparison_shows_the_charts() {
+    for (sets, picture) in [(4, "Joints"), (5, "Robot")] {
+        let mut console = with_two_jumps();
+        console.press(&vec!["t"; sets]);
+        assert_shows(&console.screen(80, 24), &[picture]);
+        console.press(&["2", "Home", "c", "Down", "c", "1"]);
+        assert_shows(&console.screen(80, 24), &["A #0 line, B #1 dotted"]);
+        assert_shows(&last(&console, 120), &["Left Right cursor"]);
+        // Without charts there is no cursor.
+        console.press(&["t"]);
+        assert!(!last(&console, 120).contains("cursor"), "{}", last(&console, 120));
+        assert_shows(&last(&console, 120), &["Esc end comparison"]);
+    }
+}
+
 /// Regression: the last line of Trials named no key of the selected row.
 #[test]
 fn the_last_line_of_trials_names_the_keys_of_the_row() {

@@ -62,6 +62,7 @@ fn first_ghost(model: &mut Model, trial: u32) -> String {
     if model.live.ghost.is_none() {
         return no_signals(model, trial);
     }
+    model.live.panel = Panel::Charts;
     let recorded = |timeline: &ReplayTimeline| timeline.trials.iter().any(|run| run.trial != trial);
     let comparable =
         model.history.traces().any(|other| other != trial) || model.timeline.as_deref().is_some_and(recorded);
@@ -108,6 +109,7 @@ fn second_ghost(model: &mut Model, a: u32, b: u32) -> String {
     model.live.comparison = Comparison::new(&model.history, compared(a), compared(b));
     match model.live.comparison {
         Some(_) => {
+            model.live.panel = Panel::Charts;
             let live = model.keymap.key(Action::LiveView);
             format!("A is trial {a}, B is trial {b}: {live} shows both in Live; there {}", keys_of_comparison(model))
         }

@@ -4,6 +4,7 @@ use quadfrog::telemetry::Mode;
 
 use crate::action::Action;
 use crate::legal::legal;
+use crate::model::live::Panel;
 use crate::model::{Model, View};
 
 /// Keys and their effects, as far as they are accepted now; none in other views.
@@ -21,7 +22,9 @@ pub fn keys(model: &Model) -> Vec<(String, String)> {
 
 fn of_comparison(model: &Model) -> Vec<(String, String)> {
     let key = |action| model.keymap.key(action);
-    let mut keys = vec![(format!("{} {}", key(Action::Left), key(Action::Right)), "cursor".to_owned())];
+    // The charts have the cursor; joints and robot in their place do not.
+    let cursor = (format!("{} {}", key(Action::Left), key(Action::Right)), "cursor".to_owned());
+    let mut keys = if model.live.panel == Panel::Charts { vec![cursor] } else { Vec::new() };
     // The last line of a replay names it already.
     if model.replay.is_none() {
         keys.insert(0, (key(Action::EndComparison), "end comparison".to_owned()));
