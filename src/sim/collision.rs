@@ -328,9 +328,8 @@ impl Collider {
         reach: f64,
     ) -> LegSurvey {
         let (factors, [thigh, calf]) = (dynamics.leg_factors(), dynamics.link_rotations());
-        let rotation =
-            |r: AxisRotation<Quad>| AxisRotation { cos: Lanes::load(simd, r.cos), sin: Lanes::load(simd, r.sin) };
-        let (hip, thigh, calf) = (rotation(factors.hip), rotation(thigh), rotation(calf));
+        let load = |rotation| AxisRotation::load(simd, rotation);
+        let (hip, thigh, calf) = (load(factors.hip), load(thigh), load(calf));
         let splat = |x: f64| Lanes::splat(simd, x);
         let up = Vector3::new(splat(up_body.x), splat(up_body.y), splat(up_body.z));
         let up_hip = hip.unrotate_x(&up);

@@ -170,6 +170,12 @@ impl<S: Simd> AxisRotation<Lanes<S>> {
         let (sin, cos) = angle.sin_cos();
         AxisRotation { cos, sin }
     }
+
+    /// Loads the rotations of the legs.
+    #[inline(always)]
+    pub fn load(simd: S, rotation: AxisRotation<Quad>) -> Self {
+        AxisRotation { cos: Lanes::load(simd, rotation.cos), sin: Lanes::load(simd, rotation.sin) }
+    }
 }
 
 impl<S: Simd> Real for Lanes<S> {

@@ -30,8 +30,8 @@ pub(super) struct LegLinks {
     pub origin_body: [Vector3<f64>; 3],
 }
 
-/// Velocity of a point at `p_body` on the calf per joint velocity, body axes: a column for each joint. Of a point on another link the
-/// columns of the joints behind it are zero.
+/// Velocity of a point at `p_body` on the calf per joint velocity, body axes: a column for each joint. Of a point on another
+/// link the caller takes the columns of the joints behind it as zero.
 #[inline(always)]
 pub(super) fn point_jacobian<T: Real>(
     hip: AxisRotation<T>,

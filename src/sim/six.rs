@@ -19,9 +19,9 @@ pub(super) fn split(six: &Six) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]))
 }
 
-/// a . b
+/// a . b; of lanes, each by its own.
 #[inline(always)]
-pub(super) fn dot(a: &Six, b: &Six) -> f64 {
+pub(super) fn dot<T: Real>(a: &[T; 6], b: &[T; 6]) -> T {
     (a[0] * b[0] + a[2] * b[2] + a[4] * b[4]) + (a[1] * b[1] + a[3] * b[3] + a[5] * b[5])
 }
 

@@ -10,7 +10,7 @@ use crate::sim::config::ContactLaw;
 use crate::sim::lanes::{Lanes, Quad, with_lanes};
 use crate::sim::leg::{LegFactors, point_jacobian};
 use crate::sim::motion::{GeneralizedVelocity, StepContext, TRUNK};
-use crate::sim::six::stack;
+use crate::sim::six::{dot, stack};
 use crate::sim::spatial::{AxisRotation, Real, cross, inner};
 use crate::sim::terrain::TerrainContact;
 
@@ -89,7 +89,7 @@ impl ContactInput<'_> {
                 &picked
             }
         };
-        let hip = AxisRotation { cos: Lanes::load(simd, factors.hip.cos), sin: Lanes::load(simd, factors.hip.sin) };
+        let hip = AxisRotation::load(simd, factors.hip);
         let [o1, o2, o3] = &factors.origin_body;
         let origins = [Lanes::vector(simd, o1), Lanes::vector(simd, o2), Lanes::vector(simd, o3)];
         let [j1, j2, j3] = point_jacobian(hip, &origins, &position);
@@ -196,9 +196,8 @@ impl<S: Simd> AxisRow<Lanes<S>> {
     /// An element of the Delassus matrix: w . w' + u . u'.
     #[inline(always)]
     fn times(&self, other: &Self) -> Lanes<S> {
-        let (w, x, u, v) = (&self.trunk, &other.trunk, &self.leg, &other.leg);
-        let trunk = (w[0] * x[0] + w[2] * x[2] + w[4] * x[4]) + (w[1] * x[1] + w[3] * x[3] + w[5] * x[5]);
-        trunk + (u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
+        let (u, v) = (&self.leg, &other.leg);
+        dot(&self.trunk, &other.trunk) + (u[0] * v[0] + u[1] * v[1] + u[2] * v[2])
     }
 }
 
