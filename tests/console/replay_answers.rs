@@ -1,4 +1,4 @@
-//! The message line of a replay: answers to the keys of who watches it, and what the operator of the session was told.
+//! The message line of a replay: answers to the viewer's keys, and the recorded answers to the operator of the session.
 
 use std::path::PathBuf;
 

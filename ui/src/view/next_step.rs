@@ -302,22 +302,19 @@ fn replay(model: &Model) -> NextStep {
     if let Some(old) = old.filter(|_| model.replay.as_ref().is_some_and(ReplayStatus::later_is_known)) {
         return step(old, model, &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play")]);
     }
-    let (next_fall, rest) = (
-        [(Action::NextFall, "next fall")],
-        [(Action::StepForward, "step"), (Action::Slower, "slower"), (Action::Faster, "faster"), (Action::Quit, "quit")],
-    );
-    let places = [
+    let mut others = vec![
         (Action::EndComparison, "end comparison"),
         (Action::Seek, "go to"),
         (Action::PreviousMarker, "previous trial"),
         (Action::NextMarker, "next trial"),
+        (Action::NextFall, "next fall"),
+        (Action::StepForward, "step"),
+        (Action::Slower, "slower"),
+        (Action::Faster, "faster"),
+        (Action::Quit, "quit"),
     ];
-    let next_fall = if fall_follows(model) { &next_fall[..] } else { &[] };
-    step(
-        format!("{key} {}", if playing { "pauses" } else { "plays" }),
-        model,
-        &[&places[..], next_fall, &rest].concat(),
-    )
+    others.retain(|(action, _)| *action != Action::NextFall || fall_follows(model));
+    step(format!("{key} {}", if playing { "pauses" } else { "plays" }), model, &others)
 }
 
 /// Whether a fall or a fault follows the playhead.
