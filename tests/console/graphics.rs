@@ -26,6 +26,8 @@ const A_WHILE: Duration = Duration::from_secs(2);
 /// The bytes with which a picture begins, by protocol.
 const BEGINS: [&[u8]; 3] = [b"\x1b_Ga=T", b"\x1bP0;1;0q", b"\x1b]1337;File="];
 const REMOVES_KITTY: &[u8] = b"\x1b_Ga=d,d=I,";
+/// File at whose appearance [`a_console_with_a_picture_one_of_whose_threads_panics`] has its defect.
+const TRIGGER: &str = "panic-now";
 
 /// A picture that was sent.
 struct Sent {
@@ -339,6 +341,7 @@ fn suspending_and_a_panic_remove_the_picture() {
     session.send("p");
     wait_for_picture(&session, 0);
     let picture = pictures(&session.sent_bytes()).remove(0);
+    std::fs::write(folder.path().join(TRIGGER), "").expect("writes");
     assert!(!session.wait().success());
     let bytes = session.sent_bytes();
     let leaves = find(&bytes, b"\x1b[?1049l", 0).expect("the other screen");
@@ -352,8 +355,11 @@ fn a_console_with_a_picture_one_of_whose_threads_panics() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
     let mut settings = ConsoleSettings::built_in();
     settings.graphics = GraphicsChoice::Kitty;
+    // In the present folder, that of the test which waits for the picture.
     let defect = || {
-        std::thread::sleep(Duration::from_secs(4));
+        while !Path::new(TRIGGER).exists() {
+            std::thread::sleep(Duration::from_millis(10));
+        }
         panic!("an injected defect");
     };
     std::thread::Builder::new().name("injected".into()).spawn(defect).expect("a thread");
