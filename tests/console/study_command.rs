@@ -487,10 +487,40 @@ fn a_proposal_that_was_not_run_is_no_trial_in_the_list_and_in_the_report() {
     let report = program.text(&["report", study]);
     assert_shows(&report, &["Ticks of 3 of 3 trials are recorded"]);
     let page: Value = serde_json::from_str(&program.text(&["report", "--json", study])).unwrap();
-    let blocks = page["sections"].as_array().unwrap().iter().flat_map(|section| section["blocks"].as_array().unwrap());
-    let tables: Vec<&Value> = blocks.filter_map(|block| block.get("table")).collect();
-    let studies = tables.iter().find(|table| table["caption"].as_str().unwrap().starts_with("Studies.")).unwrap();
+    let studies = table_of_studies(&page);
     assert_eq!(studies["rows"][0][1], 3, "{studies}");
+}
+
+/// The table of the studies in a report as JSON.
+fn table_of_studies(page: &Value) -> &Value {
+    let blocks = page["sections"].as_array().unwrap().iter().flat_map(|section| section["blocks"].as_array().unwrap());
+    let mut tables = blocks.filter_map(|block| block.get("table"));
+    tables.find(|table| table["caption"].as_str().unwrap().starts_with("Studies.")).unwrap()
+}
+
+/// Regression: the list of the studies counted the falls of repeats that confirm the best, the report did not.
+#[test]
+fn a_repeat_that_fell_is_no_fall_in_the_list_and_in_the_report() {
+    let (program, study) = study("forward");
+    let falls_of_five =
+        program.exported(&study).iter().take(5).filter(|row| row["user_attrs"]["verdict"] == "fall").count();
+    let journal = Path::new(&study).join("study.log");
+    let mut text = fs::read_to_string(&journal).unwrap();
+    for (accepted, repeat) in
+        [(r#"{"source":"sampler"}"#, r#"{"source":"confirm"}"#), (r#"{"verdict":"accept"}"#, r#"{"verdict":"fall"}"#)]
+    {
+        let of_last = |value: &str| format!(r#""trial_id":5,"user_attr":{value}"#);
+        assert!(text.contains(&of_last(accepted)), "{accepted}");
+        text = text.replace(&of_last(accepted), &of_last(repeat));
+    }
+    fs::write(&journal, text).unwrap();
+    let list = program.text(&["study", "list"]);
+    let cells: Vec<&str> = list.lines().nth(1).unwrap().split_whitespace().collect();
+    assert_eq!(cells[1..4], ["6", "5", &falls_of_five.to_string()], "{list}");
+    let page: Value = serde_json::from_str(&program.text(&["report", "--json", &study])).unwrap();
+    // Trials, accepted, falls, repeats.
+    let row = &table_of_studies(&page)["rows"][0];
+    assert_eq!([&row[1], &row[3], &row[4]], [&Value::from(6), &Value::from(falls_of_five), &Value::from(1)]);
 }
 
 /// Regression: a conclusion that an earlier version had kept from equal repeats was shown with full confidence.

@@ -19,7 +19,7 @@ use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::{table, trial_columns};
 use quadfrog::session::experiment::{self, CHANGED_PREFIX, fixed_in_words, rows_of};
-use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, counted, six_digits};
+use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, Verdict, counted, six_digits};
 use serde_json::Value;
 
 use super::completion;
@@ -36,7 +36,7 @@ pub struct StudyCommand {
 
 #[derive(Debug, Subcommand)]
 enum StudySubcommand {
-    /// List the studies in a folder and directly below it: task, trials, falls, best
+    /// List the studies in a folder and directly below it: task, trials, those that count, their falls, best
     List {
         /// The folder
         #[arg(value_name = "DIR", default_value = "recordings")]
@@ -187,11 +187,10 @@ fn list(folder: &Path) -> Result<(), Failure> {
 fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let name = Some(study_name(stored.task, stored.seed));
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
-    let trials = opened.study.trials();
     let all = opened.rows();
     let ran = all.iter().filter(|row| !row.was_not_run()).count();
     let counted = all.iter().filter(|row| row.counts()).count();
-    let falls = trials.iter().filter(|trial| trial.is_fall()).count();
+    let falls = all.iter().filter(|row| row.counts() && row.verdict == Some(Verdict::Fall)).count();
     let best = opened.best(&all).and_then(|row| row.value);
     Ok(vec![
         file.parent().unwrap_or(file).display().to_string(),
