@@ -123,7 +123,7 @@ struct StudyResult {
     point: Vec<(String, f64)>,
 }
 
-/// What a robot can do, as far as it is known.
+/// Ability of a robot, as far as it is known.
 struct Attainable {
     /// Value of its best known point.
     optimum: f64,
@@ -224,7 +224,7 @@ fn run(task: &KnownTask, targets: &[Target], seed: u64, job: &Job) -> StudyResul
     result
 }
 
-/// What a robot can do, from all its results and those of its long studies. For the optimum the best points of the [`SHORTLIST`] studies
+/// Values a robot by all its results and those of its long studies. For the optimum the best points of the [`SHORTLIST`] studies
 /// of the largest values are repeated with new noise; the largest mean chooses one, and repeats with again other noise are its value.
 fn attainable(jumper: &mut Jumper<'_>, noise: u64, results: &[&StudyResult], long: &[&StudyResult]) -> Attainable {
     let mut ranked: Vec<&StudyResult> = results.iter().copied().filter(|result| !result.point.is_empty()).collect();
@@ -337,6 +337,7 @@ fn main() {
     let jobs = if settings["jobs"].is_empty() { cores() } else { number("jobs") };
     let (robots, studies, trials, seed) =
         (number("robots").max(4), number("studies"), number("trials"), number("seed"));
+    let is_reached = |after: usize| AFTER[after] <= trials;
     let least_p_stand = Some(&settings["least_p_stand"]).filter(|text| !text.is_empty());
     let least_p_stand = least_p_stand.map(|text| text.parse().expect("`least_p_stand` is a number"));
     let wanted = &settings["samplers"];
@@ -352,10 +353,10 @@ fn main() {
          each robot. Value of the best trial, repeated {REPEATS} times, falls as 0: mean and standard error over all studies.\n"
     );
     println!(
-        "| task | sampler | {} | falls in 5, 20 | best after 5 has {REACHED} of the optimum | stood in {EARLY} at {REACHED} of the best of {LONG} |",
+        "| task | sampler | {} | falls in 5 | in 20 | best after 5 has {REACHED} of the optimum | stood in {EARLY} at {REACHED} of the best of {LONG} |",
         AFTER.map(|n| format!("after {n}")).join(" | ")
     );
-    println!("|---|---|{}---|---|---|", "---|".repeat(AFTER.len()));
+    println!("|---|---|{}---|---|---|", "---|".repeat(AFTER.len() + 1));
     let mut notes = String::new();
     for name in settings["tasks"].split(',') {
         let task = known(name, jobs, least_p_stand);
@@ -397,19 +398,23 @@ fn main() {
         for &proposer in &proposers {
             let all: Vec<(usize, StudyResult)> =
                 (0..robots).flat_map(|t| of(t, proposer).into_iter().map(move |result| (t, result))).collect();
-            let cell = |values: Vec<f64>| {
-                let (mean, error) = mean(&values);
-                format!("{mean:.3} ± {error:.3}")
+            let of_all =
+                |value: &dyn Fn(&StudyResult) -> f64| mean(&all.iter().map(|(_, r)| value(r)).collect::<Vec<_>>());
+            // Empty after more jumps than the studies have.
+            let value = |i: usize| {
+                let (mean, error) = of_all(&|result| result.best[i]);
+                if is_reached(i) { format!("{mean:.3} ± {error:.3}") } else { String::new() }
             };
-            let values: Vec<String> =
-                (0..AFTER.len()).map(|i| cell(all.iter().map(|(_, r)| r.best[i]).collect())).collect();
-            let falls = |i: usize| all.iter().map(|(_, r)| r.falls[i]).sum::<f64>() / all.len() as f64;
+            let falls = |i: usize| {
+                if is_reached(i) { format!("{:.2}", of_all(&|result| result.falls[i]).0) } else { String::new() }
+            };
+            let values: Vec<String> = (0..AFTER.len()).map(value).collect();
             let at_best =
                 |(t, r): &&(usize, StudyResult)| r.best[..3].iter().any(|best| *best >= REACHED * judged[*t].0.optimum);
             let jumped = judged.iter().flat_map(|(_, early)| early).filter(|(of, early)| *of == proposer && *early);
             let share = |count: usize| 100.0 * count as f64 / all.len() as f64;
             println!(
-                "| {} | {} | {} | {:.2}, {:.2} | {:.0} % | {:.0} % |",
+                "| {} | {} | {} | {} | {} | {:.0} % | {:.0} % |",
                 task.name,
                 proposer.name(),
                 values.join(" | "),
@@ -436,16 +441,13 @@ fn main() {
                 p_value(&differences)
             )
         };
-        let has = |proposer| proposers.contains(&proposer);
-        if has(Proposer::Sim) && has(Proposer::Gp) {
-            notes += &compare((Proposer::Sim, 2), (Proposer::Gp, 4));
-        }
-        if has(Proposer::SimMirrored) && has(Proposer::Gp) {
-            notes += &compare((Proposer::SimMirrored, 3), (Proposer::Gp, 3));
-        }
-        if has(Proposer::Gp) && has(Proposer::Tpe) {
-            notes += &compare((Proposer::Gp, 4), (Proposer::Tpe, 4));
-        }
+        let pairs = [
+            ((Proposer::Sim, 2), (Proposer::Gp, 4)),
+            ((Proposer::SimMirrored, 3), (Proposer::Gp, 3)),
+            ((Proposer::Gp, 4), (Proposer::Tpe, 4)),
+        ];
+        let is_there = |(proposer, after): (Proposer, usize)| proposers.contains(&proposer) && is_reached(after);
+        notes.extend(pairs.iter().filter(|(a, b)| is_there(*a) && is_there(*b)).map(|(a, b)| compare(*a, *b)));
         for (target, (Attainable { optimum, long }, _)) in targets.iter().zip(&judged) {
             eprintln!(
                 "{} {}: best known {optimum:.3}, of {LONG} jumps {long:.3}, {:?}",
@@ -453,7 +455,9 @@ fn main() {
             );
         }
     }
-    println!(
-        "\nDifferences of the means of each robot: mean and standard error over the robots, paired two-sided t-test:\n\n{notes}"
-    );
+    if !notes.is_empty() {
+        println!(
+            "\nDifferences of the means of each robot: mean and standard error over the robots, paired two-sided t-test:\n\n{notes}"
+        );
+    }
 }
