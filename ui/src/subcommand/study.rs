@@ -189,15 +189,15 @@ fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
     let opened = StudySelector { place: file.display().to_string(), name }.open()?;
     let all = opened.rows();
     let ran = all.iter().filter(|row| !row.was_not_run()).count();
-    let counted = all.iter().filter(|row| row.counts()).count();
-    let falls = all.iter().filter(|row| row.counts() && row.verdict == Some(Verdict::Fall)).count();
+    let counted = || all.iter().filter(|row| row.counts());
+    let falls = counted().filter(|row| row.verdict == Some(Verdict::Fall)).count();
     let best = opened.best(&all).and_then(|row| row.value);
     Ok(vec![
         file.parent().unwrap_or(file).display().to_string(),
         stored.task.name().to_owned(),
         stored.seed.to_string(),
         ran.to_string(),
-        counted.to_string(),
+        counted().count().to_string(),
         falls.to_string(),
         best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit())),
     ])
