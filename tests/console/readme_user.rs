@@ -143,7 +143,7 @@ fn frozen_charts_of_a_replay_end_where_the_playhead_goes_elsewhere() {
         (0..2000).step_by(5).for_each(|ms| console.tick(at(ms)));
         console.press(&["Left"]);
         console.wait(3000);
-        assert_shows(&console.screen(120, 40), &["VIEW FROZEN -0.0 s"]);
+        assert_shows(&console.screen(120, 40), &["VIEW FROZEN 0.0 s"]);
         console.tick(at(2500));
         assert_shows(&console.screen(120, 40), &["VIEW FROZEN -0.5 s"]);
         console.press(&[key]);

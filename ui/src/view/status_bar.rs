@@ -288,8 +288,9 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
                 None => model.clock.saturating_sub(*at).as_secs_f64(),
             };
             let view = if narrow { "" } else { "VIEW " };
+            let minus = if ago_s < 0.05 { "" } else { "-" };
             vec![
-                span(theme, Role::Hardware, format!(" {view}FROZEN -{ago_s:.1} s ")),
+                span(theme, Role::Hardware, format!(" {view}FROZEN {minus}{ago_s:.1} s ")),
                 span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
             ]
         }
