@@ -7,13 +7,15 @@
 Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, motors with
 lag and a torque-speed curve, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Prints a
 JSON line for each study: the value of the best trial after 1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls
-as 0 and counted. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a folder with
+as 0 and counted. `--joints` gives the robots the rotors of the Go1, and dry and viscous friction of the joints drawn from the ranges of
+config/prior.toml. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a folder with
 that task, as examples/continuous without its first point. SI units, radians.
 """
 
 import argparse
 import json
 import subprocess
+import tomllib
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -35,7 +37,7 @@ def no_load_speed():
 class Robot:
     """A Go1 in MuJoCo with motors and sensors that are not ideal."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, joints=False):
         random = np.random.default_rng(seed)
         self.m, self.limits = model()
         self.no_load_speed = no_load_speed()
@@ -44,6 +46,18 @@ class Robot:
         self.m.geom_friction[:, 0] = self.friction
         self.m.body_mass[:] *= self.mass
         self.m.body_inertia[:] *= self.mass
+        if joints:
+            self.add_joints(np.random.default_rng(seed + 1_000_000))
+
+    def add_joints(self, random):
+        """Adds rotors and friction to the joints."""
+        root = URDF.parents[2]
+        rotor = tomllib.loads((root / "robots/go1/robot.toml").read_text())["motor"]
+        ranges = tomllib.loads((root / "config/prior.toml").read_text())["ranges"]
+        # The trunk has the first six degrees of freedom.
+        self.m.dof_armature[6:] = np.tile(np.square(rotor["gear_ratio"]) * rotor["rotor_inertia_kgm2"], len(LEGS))
+        self.m.dof_frictionloss[6:] = random.uniform(*ranges["dry_friction_nm"])
+        self.m.dof_damping[6:] = random.uniform(*ranges["viscous_friction_nm_s"])
 
     def value(self, task, params, seed):
         """Objective of a jump, none for a fall."""
@@ -72,8 +86,8 @@ class Robot:
         return {"forward": x, "lateral-left": y, "continuous": x / IN_A_ROW}.get(task, outcome["yaw_change_rad"])
 
 
-def study(program, task, sampler, seed, config, jumps):
-    robot = Robot(seed)
+def study(program, task, sampler, seed, config, jumps, joints):
+    robot = Robot(seed, joints)
     command = [program, "ask-tell", "--task", "forward" if task == "continuous" else task, "--sampler", sampler, "--seed", str(seed)]
     talk = subprocess.Popen(command + (["--config", config] if config else []), stdin=-1, stdout=-1, text=True)
 
@@ -111,11 +125,13 @@ def main():
     parser.add_argument("--seed", type=int, default=7000)
     parser.add_argument("--jumps", type=int, default=AFTER[-1])
     parser.add_argument("--config")
+    parser.add_argument("--joints", action="store_true")
     arguments = parser.parse_args()
     for task in arguments.tasks.split(","):
         for seed in range(arguments.seed, arguments.seed + arguments.studies):
             for sampler in arguments.samplers.split(","):
-                print(json.dumps(study(arguments.program, task, sampler, seed, arguments.config, arguments.jumps)), flush=True)
+                outcome = study(arguments.program, task, sampler, seed, arguments.config, arguments.jumps, arguments.joints)
+                print(json.dumps(outcome), flush=True)
 
 
 if __name__ == "__main__":
