@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 
 URDF = pathlib.Path(__file__).resolve().parents[2] / "robots/go1/go1.urdf"
+PARTS = ("hip", "thigh", "calf")
 LEGS, SIDE, FRONT = ["FR", "FL", "RR", "RL"], np.array([-1, 1, -1, 1.0]), np.array([1, 1, -1, -1.0])
 ABDUCTION, THIGH, CALF, FOOT_RADIUS = 0.08, 0.213, 0.213, 0.02
 STANCE = np.array([0.0, 0.14, -0.25])
@@ -30,6 +31,12 @@ TERMS = dict(
 )
 BOUNDS = dict(f0_hz=(0.75, 1.75), along_n=(0, 150), up_n=(150, 350))
 TASKS = ["forward", "lateral-left", "twist-ccw"]
+
+
+def joint_limits(attribute):
+    """Limits of the joints by the URDF: `effort`, N m, or `velocity`, rad/s."""
+    joints = {joint.find("child").get("link"): joint for joint in ElementTree.parse(URDF).getroot().findall("joint")}
+    return np.array([float(joints[f"{leg}_{part}"].find("limit").get(attribute)) for leg in LEGS for part in PARTS])
 
 
 def model():
@@ -53,9 +60,9 @@ def model():
         half = f"{radius} {float(length) / 2}" if length else radius
         return f'<geom type="{geometry.tag}" pos="{origin}" size="{half}"/>'
 
-    legs, motors, torques = "", "", []
+    legs, motors = "", ""
     for leg in LEGS:
-        names = [f"{leg}_{part}" for part in ("hip", "thigh", "calf")]
+        names = [f"{leg}_{part}" for part in PARTS]
         for name in names:
             joint = joints[name]
             limit = joint.find("limit")
@@ -63,7 +70,6 @@ def model():
             legs += f'<body pos="{joint.find("origin").get("xyz")}">{inertial(name)}'
             legs += f'<joint name="{name}" axis="{joint.find("axis").get("xyz")}" range="{bounds}"/>'
             motors += f'<motor joint="{name}"/>'
-            torques.append(float(limit.get("effort")))
         legs += f'<geom name="{leg}" type="sphere" size="{FOOT_RADIUS}" pos="0 0 -{CALF}"/></body></body></body>'
     trunk = "".join(shape(collision) for collision in links["trunk"].findall("collision"))
     text = f"""<mujoco><compiler angle="radian" autolimits="true"/>
@@ -71,7 +77,7 @@ def model():
 <default><geom friction="1 0 0" condim="3" solref="0.002 1" solimp="0.98 0.999 0.0005"/><joint solreflimit="0.004 1"/></default>
 <worldbody><geom type="plane" size="50 50 .1"/><body name="trunk" pos="0 0 1">{inertial("trunk")}<freejoint/>
 {trunk}{legs}</body></worldbody><actuator>{motors}</actuator></mujoco>"""
-    return mujoco.MjModel.from_xml_string(text), np.array(torques)
+    return mujoco.MjModel.from_xml_string(text), joint_limits("effort")
 
 
 def foot(q, side):

@@ -16,10 +16,9 @@ import argparse
 import json
 import subprocess
 import tomllib
-import xml.etree.ElementTree as ElementTree
 
 import numpy as np
-from reference_landing import LEGS, URDF, jump, model
+from reference_landing import LEGS, URDF, joint_limits, jump, model
 
 PAPER = dict(
     attitude_rate_gain=0.0, foot_placement_s=0.0, landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3)
@@ -28,19 +27,13 @@ AFTER = [1, 3, 5, 10, 20]
 IN_A_ROW = 5
 
 
-def no_load_speed():
-    """Speed limit of each joint, rad/s: two thirds of a hip's at a calf, whose linkage adds 1.5."""
-    limits = {joint.get("name"): joint.find("limit") for joint in ElementTree.parse(URDF).getroot().findall("joint")}
-    return np.array([float(limits[f"{leg}_{part}_joint"].get("velocity")) for leg in LEGS for part in ("hip", "thigh", "calf")])
-
-
 class Robot:
     """A Go1 in MuJoCo with motors and sensors that are not ideal."""
 
     def __init__(self, seed, joints=False):
         random = np.random.default_rng(seed)
         self.m, self.limits = model()
-        self.no_load_speed = no_load_speed()
+        self.no_load_speed = joint_limits("velocity")
         self.friction, self.mass = random.uniform(0.5, 0.9), random.uniform(0.95, 1.1)
         self.lag_s, self.full_torque_share = random.uniform(0.002, 0.006), random.uniform(0.5, 0.7)
         self.m.geom_friction[:, 0] = self.friction

@@ -9,7 +9,7 @@ use ratatui::layout::{Alignment, Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, clock_ms, number, span, truncate};
+use super::draw::{clock, clock_ms, number, span, truncate, without_sign_of_zero};
 use crate::action::Action;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, message_rows, tabs};
 use crate::model::trials::BestValue;
@@ -288,9 +288,9 @@ pub fn render_tabs(frame: &mut Frame, area: Rect, model: &Model) {
                 None => model.clock.saturating_sub(*at).as_secs_f64(),
             };
             let view = if narrow { "" } else { "VIEW " };
-            let minus = if ago_s < 0.05 { "" } else { "-" };
+            let at_s = without_sign_of_zero(-ago_s);
             vec![
-                span(theme, Role::Hardware, format!(" {view}FROZEN {minus}{ago_s:.1} s ")),
+                span(theme, Role::Hardware, format!(" {view}FROZEN {at_s:.1} s ")),
                 span(theme, Role::Key, format!(" {}", model.keymap.key(Action::Freeze))),
             ]
         }
