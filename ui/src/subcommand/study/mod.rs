@@ -1,32 +1,30 @@
 //! `quadfrog study`: stored studies, of this program and of other Optuna programs.
 
+mod selector;
+mod tables;
+
 use std::fmt::Write as _;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::{notice, output};
-use anyhow::Context;
-use clap::{Args, Subcommand, ValueEnum};
-use clap_complete::ArgValueCandidates;
+use clap::{Args, Subcommand};
 use quadfrog::config::Config;
-use quadfrog::engine::{
-    Opened, STUDY_FILE, StoredStudy, newest_config, open_stored, running_session, stored_studies, study_files,
-    study_name,
-};
-use quadfrog::optimize::exchange::{self, TableTrial};
-use quadfrog::optimize::study::{Storage, StudyError};
-use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial, TrialState};
-use quadfrog::report::columns::{TableFormat, TableWriter};
-use quadfrog::report::{table, trial_columns};
+use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, running_session, stored_studies, study_files, study_name};
+use quadfrog::optimize::study::Storage;
+use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
+use quadfrog::report::columns::TableFormat;
+use quadfrog::report::table;
 use quadfrog::session::experiment::{self, CHANGED_PREFIX, fixed_in_words, rows_of};
 use quadfrog::trial::{ParameterInfo, ParameterValues, TrialRecord, Verdict, counted, six_digits};
 use serde_json::Value;
 
-use super::completion;
 use super::failure::Failure;
-use super::output_file::write_file;
 use super::selection::parse_storage;
-use super::table::{format_of_name, read_table_format, table_format, written_format};
+use super::table::{read_table_format, table_format};
+
+use selector::{StudySelector, until_continued};
+use tables::{QueuedRows, export, import};
 
 #[derive(Debug, Args)]
 pub struct StudyCommand {
@@ -95,25 +93,6 @@ enum StudySubcommand {
     },
 }
 
-/// The rows of a table that are queued.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum QueuedRows {
-    /// All
-    All,
-    /// Those that were queued when the table was written
-    Waiting,
-}
-
-#[derive(Debug, Args)]
-struct StudySelector {
-    /// Folder of a study, its study.log, any Optuna journal, or redis://HOST:PORT/DB
-    #[arg(value_name = "STUDY", add = ArgValueCandidates::new(completion::studies))]
-    place: String,
-    /// Name of the study, if the journal holds several
-    #[arg(long, value_name = "NAME")]
-    name: Option<String>,
-}
-
 fn parse_setting(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write it as NAME=NUMBER, for example Fx=120")?;
     let number = value.trim().parse::<f64>().map_err(|_| format!("`{value}` is not a number: {name}=NUMBER"))?;
@@ -128,22 +107,6 @@ pub fn run(command: &StudyCommand) -> Result<(), Failure> {
         StudySubcommand::Import { study, table, format, queue } => import(study, table, *format, *queue),
         StudySubcommand::Best { study, config } => best(study, config.as_deref()),
         StudySubcommand::Enqueue { study, point } => enqueue(study, point),
-    }
-}
-
-impl StudySelector {
-    /// Returns the last configuration that the study ran with, if its folder holds one, else the built-in one.
-    fn config(&self) -> Result<Config, Failure> {
-        let own = match parse_storage(&self.place) {
-            // A folder of studies may have one of the name `config`.
-            Storage::File(file) if file.is_file() => file.parent().and_then(newest_config),
-            _ => None,
-        };
-        Ok(Config::load(own.as_ref().map(|(_, config)| config.as_path()))?)
-    }
-
-    fn open(&self) -> Result<Opened, Failure> {
-        Ok(open_stored(&parse_storage(&self.place), self.name.as_deref(), &self.config()?)?)
     }
 }
 
@@ -337,117 +300,6 @@ fn best_line(config: &Config, opened: &Opened, rows: &[TrialRecord]) -> String {
     let configured = opened.ours.as_ref().map(|ours| config.task(ours.task).gains().values()).unwrap_or_default();
     let units = opened.parameters.iter().map(|parameter| (parameter.name.clone(), parameter.unit.clone())).collect();
     table::best_line(opened.best(rows), opened.model_best(), &configured, opened.unit(), &units)
-}
-
-fn export(selector: &StudySelector, format: Option<TableFormat>, output: Option<&Path>) -> Result<(), Failure> {
-    let format = written_format(format, output)?;
-    let opened = selector.open()?;
-    let study = &opened.study;
-    let columns = trial_columns::of(study.trials(), study.metric_name(), |number| study.note_of(number));
-    if let Some(path) = output {
-        write_file(path, format.into(), |file| {
-            let mut table = TableWriter::new(format, file, &columns)?;
-            table.write(&columns)?;
-            table.finish()
-        })?;
-        let not_run = opened.rows().iter().filter(|row| row.was_not_run()).count();
-        let not_run = if not_run > 0 { format!(", {not_run} of them not run") } else { String::new() };
-        let queued = study.waiting().count();
-        let and_queued = if queued > 0 { format!(" and {}", counted(queued, "queued point")) } else { String::new() };
-        let begun = counted(study.trials().len() - queued, "trial");
-        notice!("{begun}{not_run}{and_queued}: {}", path.display());
-        return Ok(());
-    }
-    let mut bytes = Vec::new();
-    let mut table = TableWriter::new(format, &mut bytes, &columns).context("the table")?;
-    table.write(&columns).context("the table")?;
-    table.finish().context("the table")?;
-    output::data(&String::from_utf8_lossy(&bytes));
-    Ok(())
-}
-
-fn import(
-    selector: &StudySelector,
-    table: &Path,
-    format: Option<TableFormat>,
-    queue: Option<QueuedRows>,
-) -> Result<(), Failure> {
-    let refuse = |error: &dyn std::fmt::Display| Failure::input(format!("{}: {error}", table.display()));
-    let format = format.or_else(|| format_of_name(table)).unwrap_or(TableFormat::Csv);
-    if format == TableFormat::Parquet {
-        return Err(refuse(&"a Parquet table is not imported; convert it: pandas.read_parquet(...).to_csv(...)"));
-    }
-    if table.metadata().is_ok_and(|about| !about.is_file()) {
-        return Err(refuse(&"it is not a regular file; give a table, *.csv or *.json"));
-    }
-    let text = std::fs::read_to_string(table).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => refuse(&"there is no such file; give a table, *.csv or *.json"),
-        _ => refuse(&format!("it cannot be read: {error}")),
-    })?;
-    let trials = match format {
-        TableFormat::Json => exchange::from_json(&text),
-        _ => exchange::from_csv(&text),
-    }
-    .map_err(|error| refuse(&error))?;
-    let mut opened = selector.open()?;
-    let then = until_continued(&opened);
-    let study = &mut opened.study;
-    // All or none: every row is checked before the first is added.
-    let is_asked = |trial: &TableTrial| match queue {
-        None => trial.state.is_finished(),
-        Some(QueuedRows::All) => true,
-        Some(QueuedRows::Waiting) => trial.state == TrialState::Waiting,
-    };
-    for (row, trial) in (1..).zip(&trials).filter(|(_, trial)| is_asked(trial)) {
-        study.check_point(&trial.parameters).map_err(|error| {
-            let remedy = match error {
-                StudyError::Outside { .. } => "; widen them with `B` in the console, or leave the row out",
-                _ => "",
-            };
-            refuse(&format!("row {row}: {error}{remedy}"))
-        })?;
-    }
-    // A point that was removed from the queue has never run: its row has no parameters.
-    let (trials, without_parameters): (Vec<TableTrial>, Vec<TableTrial>) =
-        trials.into_iter().partition(|trial| !trial.parameters.is_empty());
-    let left_out = match without_parameters.len() {
-        0 => String::new(),
-        rows => format!("; {} without parameters left out", counted(rows, "row")),
-    };
-    let (finished, unfinished): (Vec<TableTrial>, Vec<TableTrial>) =
-        trials.into_iter().partition(|trial| trial.state.is_finished());
-    if queue.is_none() {
-        let given = finished.len();
-        let added = experiment::import(study, finished).map_err(|error| refuse(&error))?.len();
-        let mut text = format!("{} imported", counted(added, "trial"));
-        if given > added {
-            let _ = write!(text, "; {} were there already (same parameters, value and times)", given - added);
-        }
-        if !unfinished.is_empty() {
-            let waited = unfinished.iter().filter(|trial| trial.state == TrialState::Waiting).count();
-            let queue = if waited > 0 { format!(", --queue=waiting queues {waited}") } else { String::new() };
-            let _ = write!(text, "; {} ignored{queue}", counted(unfinished.len(), "unfinished trial"));
-        }
-        output::text(&(text + &left_out + "\n"));
-        return Ok(());
-    }
-    let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).filter(is_asked).collect();
-    for point in &points {
-        study.enqueue(&point.parameters, &[])?;
-    }
-    output::text(&format!("{} queued{left_out}{then}\n", counted(points.len(), "point")));
-    Ok(())
-}
-
-/// Says of a study that has all of its trials what makes a queued point run; empty for another study.
-fn until_continued(opened: &Opened) -> &'static str {
-    // Also one whose verdict its session can still take back.
-    let counted = opened.rows().iter().filter(|row| row.counts() && !row.confirms_best()).count();
-    let budget = opened.ours.as_ref().and_then(|ours| ours.budget);
-    match budget.is_some_and(|budget| counted >= budget as usize) {
-        true => "; the study has all of its trials: it runs once `C` in the console gives more",
-        false => "",
-    }
 }
 
 fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> {
