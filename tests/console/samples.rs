@@ -35,11 +35,17 @@ fn the_samples_are_small_whole_and_of_the_present_format() {
     assert_shows(&best, &["0.721"]);
 }
 
-/// Regression: in a fresh clone `quadfrog replay` denied every recording below its folder.
+/// Regression: in a fresh clone `quadfrog replay` denied every recording below its folder. The samples are copied: their own folder has
+/// the studies, too, of everyone who has run the program in it.
 #[test]
 fn a_folder_above_the_samples_names_one_of_them() {
-    let above = samples().join("..");
-    let refused = Program::new().refused(&["replay", above.to_str().unwrap()]);
+    let above = tempfile::tempdir().unwrap();
+    for name in ["forward", "fall"] {
+        let copy = above.path().join("samples").join(name);
+        fs::create_dir_all(&copy).unwrap();
+        fs::copy(recording(name), copy.join("session.mcap")).unwrap();
+    }
+    let refused = Program::new().refused(&["replay", above.path().to_str().unwrap()]);
     assert_shows(&refused, &["no session.mcap in it or in a folder directly below it", "for example ", "samples/fall"]);
 }
 
