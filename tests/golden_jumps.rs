@@ -2,17 +2,23 @@
 //! settling, one impulse or several, 1.5 s until the outcome is read. `golden/jumps.json` holds jumps of the paper's controller,
 //! `golden/jumps_terms.json` jumps with the attitude rate term and the foot placement, `golden/jumps_landing.json` with the landing
 //! terms as well (written by `tests/support/reference_landing.py`), `golden/jumps_continuous.json` jumps in a row,
-//! `golden/jumps_go2.json` jumps of the Go2 (written by `tests/support/reference_go2.py`).
+//! `golden/jumps_go2.json` jumps of the Go2 (written by `tests/support/reference_go2.py`). `golden/jumps_motors.json` holds jumps of robots
+//! like those of a prior, by the protocol of this program's trials (written by `tests/support/reference_motors.py`).
 
 mod support;
 
 use nalgebra::Vector3;
+use quadfrog::config::Config;
 use quadfrog::control::foot_placement::SwingLegs;
 use quadfrog::control::force_profile::amplitudes_leg;
 use quadfrog::control::landing::LandingLegs;
 use quadfrog::control::leg::{LegTarget, feet, torques};
+use quadfrog::engine::prior_plan;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, LEGS, PerLeg, Placement, Robot};
+use quadfrog::session::evaluation::evaluate;
+use quadfrog::session::rollout::Rollout;
+use quadfrog::sim::ensemble::RobotProperties;
 use quadfrog::sim::{BodyKind, ContactLaw, SimConfig, Simulator};
 use quadfrog::telemetry::{Cutoff, Estimate, LandingTerms};
 use quadfrog::trial::{Gains, JumpParameters, Task};
@@ -50,7 +56,23 @@ struct Case {
     f1_hz: f64,
     #[serde(default)]
     terms: Terms,
+    /// What sets the robot apart from the configured one; none for the protocol with ideal motors.
+    #[serde(default)]
+    robot: Option<Properties>,
     expect: Outcome,
+}
+
+/// Properties of a robot of a prior, without delay.
+#[derive(Deserialize, Clone, Copy)]
+struct Properties {
+    mass: f64,
+    inertia: f64,
+    torque_limit: f64,
+    full_torque_speed_share: f64,
+    friction: f64,
+    torque_lag_s: f64,
+    dry_friction_nm: f64,
+    viscous_friction_nm_s: f64,
 }
 
 fn one() -> u32 {
@@ -154,6 +176,39 @@ fn jump(robot: &RobotDescription, config: &SimConfig, file: &File, case: &Case) 
     outcome
 }
 
+/// Runs one case as this program runs a trial on a simulated robot with `properties`.
+fn trial(robot: &RobotDescription, config: &SimConfig, case: &Case, properties: Properties) -> Outcome {
+    let Properties { mass, inertia, torque_limit, full_torque_speed_share, friction, .. } = properties;
+    let Properties { torque_lag_s, dry_friction_nm, viscous_friction_nm_s, .. } = properties;
+    let properties = RobotProperties {
+        mass,
+        inertia,
+        torque_limit,
+        full_torque_speed_share,
+        friction,
+        delay_ms: 0,
+        torque_lag_s,
+        dry_friction_nm,
+        viscous_friction_nm_s,
+    };
+    let (world_robot, mut world) = properties.apply(robot, config);
+    world.sensors.enabled = false;
+    let task: Task = case.task.parse().unwrap();
+    let plan = prior_plan(&Config::load(None).unwrap(), robot, task).unwrap();
+    let point = JumpParameters { f0_hz: case.f0_hz, f1_hz: 0.0, fx_n: case.Fx_n, fy_n: case.Fy_n, fz_n: case.Fz_n };
+    let mut rollout = Rollout::new(Simulator::new(&world_robot, &world).unwrap(), &plan.settings);
+    let run = evaluate(&mut rollout, &plan.control.trial(task, point));
+    let takeoff = |tick: &&quadfrog::telemetry::Tick| tick.trial_time_s > 0.0 && tick.estimate.contact == [false; LEGS];
+    let measured = run.measured.as_ref().unwrap();
+    Outcome {
+        fell: !run.stood(),
+        takeoff_s: rollout.ticks().iter().find(takeoff).map(|tick| tick.trial_time_s),
+        apex_rise_m: measured.apex_m,
+        displacement_m: [measured.dx_m, measured.dy_m, 0.0],
+        yaw_change_rad: measured.dyaw_rad,
+    }
+}
+
 /// Returns the interpolated quantile `share` of the differences.
 fn percentile(differences: &mut [f64], share: f64) -> f64 {
     differences.sort_by(f64::total_cmp);
@@ -193,7 +248,11 @@ fn compare(robot: &RobotDescription, config: &SimConfig, file: &File) -> Differe
     let mut agree = 0;
     println!("task          f0   Fx   Fy   Fz |  here   there |   apex rise     | take-off | landing | yaw");
     for case in &file.cases {
-        let (found, expect) = (jump(robot, config, file, case), &case.expect);
+        let found = match case.robot {
+            Some(properties) => trial(robot, config, case, properties),
+            None => jump(robot, config, file, case),
+        };
+        let expect = &case.expect;
         let rise = 100.0 * (found.apex_rise_m / expect.apex_rise_m - 1.0);
         let off = 1000.0 * (found.takeoff_s.unwrap_or(f64::NAN) - expect.takeoff_s.unwrap_or(f64::NAN));
         let place = Vector3::from(found.displacement_m) - Vector3::from(expect.displacement_m);
@@ -330,6 +389,22 @@ fn golden_jumps_with_the_landing_terms() {
     let (robot, config) = reference_setup(&file);
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases with the landing terms: {found}", file.cases.len());
+    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
+    assert!(found.takeoff_ms <= 5.0, "take-off");
+    assert!(found.landing_cm <= 3.0, "landing");
+    assert!(found.twist <= 5.0, "yaw of twists");
+    assert!(found.agreement >= 90.0, "falls");
+}
+
+/// The trials of this program on robots of a prior, with torque-speed curve, lag, rotors and friction in the joints, end as MuJoCo's jumps.
+#[test]
+fn golden_jumps_of_robots_of_a_prior() {
+    let file: File = support::golden("jumps_motors.json");
+    assert!(file.cases.iter().all(|case| case.robot.is_some()));
+    let (robot, mut config) = reference_setup(&file);
+    config.contact.fall_bodies.clear();
+    let found = compare(&robot, &config, &file);
+    println!("golden_jumps: {} cases of robots of a prior: {found}", file.cases.len());
     assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
     assert!(found.takeoff_ms <= 5.0, "take-off");
     assert!(found.landing_cm <= 3.0, "landing");

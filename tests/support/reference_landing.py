@@ -115,10 +115,31 @@ def exact_sensors(*state):
     return state
 
 
-def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
-    """One jump, or `jumps` of the case in a row with the frequency `f1_hz` between them. `motors` gives the torques of a tick from demanded
-    torques and joint speeds; `sensors` what the controller reads of joint positions and speeds and of the trunk's angular and linear
-    velocity in its own frame."""
+def touching(d, leg_of):
+    """The feet with a contact point."""
+    contact = np.zeros(4, bool)
+    for geom in d.contact.geom.flatten():
+        if geom in leg_of:
+            contact[leg_of[geom]] = True
+    return contact
+
+
+def foot_loads(m, d, leg_of):
+    """Normal forces on the feet, N."""
+    loads, force = np.zeros(4), np.zeros(6)
+    for number, pair in enumerate(d.contact.geom):
+        for geom in pair:
+            if geom in leg_of:
+                mujoco.mj_contactForce(m, d, number, force)
+                loads[leg_of[geom]] += force[0]
+    return loads
+
+
+def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors, control=None):
+    """One jump, or `jumps` of the case in a row with the frequency `f1_hz` between them. `motors` gives the torques of a physics step
+    from demanded torques and joint speeds; `sensors` what the controller reads of joint positions and speeds and of the trunk's angular
+    and linear velocity in its own frame. With `control`, the content of config/control.toml, contact and end of the trial are those of
+    quadfrog: a foot is down by its mean load of a tick, and the outcome is read at rest; a robot that does not come to rest fell."""
     landing = terms["landing"]
     d = mujoco.MjData(m)
     d.qpos[:7] = [0, 0, -STANCE[2] + FOOT_RADIUS, 1, 0, 0, 0]
@@ -131,19 +152,24 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
     expect = dict(fell=False, takeoff_s=None, apex_rise_m=0.0)
     yaw, last_yaw, origin, airborne = 0.0, 0.0, None, 0
     swing, lost, landed = np.zeros(4, bool), np.zeros(4, int), [None] * 4
-    for tick in range(int(round((end + 1.5) * 1000))):
+    loads, quiet, steps = np.zeros(4), 0, round(0.001 / m.opt.timestep)
+    longest_s = control["settle"]["cap_s"] if control else 1.5
+    for tick in range(int(round((end + longest_s) * 1000))):
         t = tick * 0.001
         rotation = d.xmat[1].reshape(3, 3)
-        contact = np.zeros(4, bool)
-        for geom in d.contact.geom.flatten():
-            if geom in leg_of:
-                contact[leg_of[geom]] = True
+        contact = loads >= control["contact"]["force_n"] if control else touching(d, leg_of)
         roll, pitch = np.arctan2(rotation[2, 1], rotation[2, 2]), -np.arcsin(np.clip(rotation[2, 0], -1, 1))
         heading = np.arctan2(rotation[1, 0], rotation[0, 0])
         yaw += (heading - last_yaw + np.pi) % (2 * np.pi) - np.pi
         last_yaw = heading
         if origin is None and t >= start - 1e-9:
             origin, initial_yaw = d.qpos[:3].copy(), yaw
+        if control and t >= end:
+            speed, rate = np.linalg.norm(d.qvel[:3]), np.linalg.norm(d.qvel[3:6])
+            settle = control["settle"]
+            quiet = quiet + 1 if contact.all() and speed < settle["speed_m_s"] and rate < settle["rate_rad_s"] else 0
+            if quiet >= 1000 * settle["quiet_s"]:
+                break
         since = (t - start) % period if start - 1e-9 <= t < end else -1.0
         theta = np.pi + 2 * np.pi * case["f0_hz"] * max(since, 0.0)
         force = np.sin(theta) if -1e-9 <= since < impulse else 0.0
@@ -173,13 +199,19 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors):
                 f[2] += K_ATT * (rotation @ CORNERS)[2, leg]
                 f[2] += terms["attitude_rate_gain"] * np.cross(omega, CORNERS[:, leg])[2]
             tau[k] = jacobian.T @ f - KD_JOINT * dq
-        d.ctrl[:] = motors(tau, d.qvel[6:], limits)
         if origin is not None:
             expect["apex_rise_m"] = max(expect["apex_rise_m"], float(d.qpos[2] - origin[2]))
             if expect["takeoff_s"] is None and not contact.any():
                 expect["takeoff_s"] = t - start
             expect["fell"] |= bool(abs(roll) > 1.0 or abs(pitch) > 1.0)
-        mujoco.mj_step(m, d, 4)
+        loads[:] = 0
+        for _ in range(steps):
+            d.ctrl[:] = motors(tau, d.qvel[6:], limits)
+            mujoco.mj_step(m, d)
+            if control:
+                loads += foot_loads(m, d, leg_of) / steps
+    else:
+        expect["fell"] |= control is not None
     expect.update(displacement_m=(d.qpos[:3] - origin).tolist(), yaw_change_rad=float(yaw - initial_yaw))
     return expect
 

@@ -15,14 +15,11 @@ that task, as examples/continuous without its first point. SI units, radians.
 import argparse
 import json
 import subprocess
-import tomllib
 
 import numpy as np
-from reference_landing import LEGS, URDF, joint_limits, jump, model
+from reference_landing import jump, model
+from reference_motors import CONTROL, PAPER, RANGES, Motors, add_joints
 
-PAPER = dict(
-    attitude_rate_gain=0.0, foot_placement_s=0.0, landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3)
-)
 AFTER = [1, 3, 5, 10, 20]
 IN_A_ROW = 5
 
@@ -33,35 +30,19 @@ class Robot:
     def __init__(self, seed, joints=False):
         random = np.random.default_rng(seed)
         self.m, self.limits = model()
-        self.no_load_speed = joint_limits("velocity")
         self.friction, self.mass = random.uniform(0.5, 0.9), random.uniform(0.95, 1.1)
         self.lag_s, self.full_torque_share = random.uniform(0.002, 0.006), random.uniform(0.5, 0.7)
         self.m.geom_friction[:, 0] = self.friction
         self.m.body_mass[:] *= self.mass
         self.m.body_inertia[:] *= self.mass
         if joints:
-            self.add_joints(np.random.default_rng(seed + 1_000_000))
-
-    def add_joints(self, random):
-        """Adds rotors and friction to the joints."""
-        root = URDF.parents[2]
-        rotor = tomllib.loads((root / "robots/go1/robot.toml").read_text())["motor"]
-        ranges = tomllib.loads((root / "config/prior.toml").read_text())["ranges"]
-        # The trunk has the first six degrees of freedom.
-        self.m.dof_armature[6:] = np.tile(np.square(rotor["gear_ratio"]) * rotor["rotor_inertia_kgm2"], len(LEGS))
-        self.m.dof_frictionloss[6:] = random.uniform(*ranges["dry_friction_nm"])
-        self.m.dof_damping[6:] = random.uniform(*ranges["viscous_friction_nm_s"])
+            random = np.random.default_rng(seed + 1_000_000)
+            add_joints(self.m, random.uniform(*RANGES["dry_friction_nm"]), random.uniform(*RANGES["viscous_friction_nm_s"]))
 
     def value(self, task, params, seed):
         """Objective of a jump, none for a fall."""
-        random, torque = np.random.default_rng(seed), np.zeros(12)
-
-        def motors(demanded, speed, limits):
-            share = np.clip((1 - np.abs(speed) / self.no_load_speed) / (1 - self.full_torque_share), 0, 1)
-            # The curve limits the torque that drives, not the one that brakes.
-            most = np.where(demanded * speed > 0, share * limits, limits)
-            torque[:] += (1 - np.exp(-0.001 / self.lag_s)) * (np.clip(demanded, -most, most) - torque)
-            return torque
+        random = np.random.default_rng(seed)
+        motors = Motors(self.lag_s, self.full_torque_share, self.m.opt.timestep)
 
         def sensors(q, speed, omega, velocity):
             noise = lambda size, deviation: random.normal(0, deviation, size)
@@ -72,7 +53,7 @@ class Robot:
             case.update(task="forward", f1_hz=params["f1"], jumps=IN_A_ROW)
         else:
             case.update(task=task)
-        outcome = jump(self.m, self.limits, case, PAPER, motors, sensors)
+        outcome = jump(self.m, self.limits, case, PAPER, motors, sensors, CONTROL)
         if outcome["fell"]:
             return None
         x, y, _ = outcome["displacement_m"]
