@@ -4,12 +4,13 @@
     pip install mujoco numpy
     python3 tests/support/sim_to_real_mujoco.py target/release/quadfrog --tasks forward,twist-ccw --samplers sim,gp --studies 3
 
-Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, motors with
-lag and a torque-speed curve, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Prints a
-JSON line for each study: the value of the best trial after 1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls
-as 0 and counted. `--joints` gives the robots the rotors of the Go1, and dry and viscous friction of the joints drawn from the ranges of
-config/prior.toml. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a folder with
-that task, as examples/continuous without its first point. SI units, radians.
+Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, the motors of
+reference_motors.py, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Contact, end and
+value of a jump are those of quadfrog's trials (config/control.toml). Prints a JSON line for each study: the value of the best trial after
+1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted. `--joints` gives the robots the rotors of the Go1,
+and dry and viscous friction of the joints drawn from the ranges of config/prior.toml. The task `continuous` is five jumps forward in a
+row, its value their mean length; `--config` is then a folder with that task, as examples/continuous without its first point. SI units,
+radians.
 """
 
 import argparse
