@@ -56,7 +56,7 @@ struct Case {
     f1_hz: f64,
     #[serde(default)]
     terms: Terms,
-    /// What sets the robot apart from the configured one; none for the protocol with ideal motors.
+    /// Differences of the robot from the configured one; none for the protocol with ideal motors.
     #[serde(default)]
     robot: Option<Properties>,
     expect: Outcome,
