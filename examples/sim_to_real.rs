@@ -31,7 +31,7 @@ use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::ensemble::RobotProperties;
 use quadfrog::sim::{SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::{JumpParameters, ParameterValues, Task};
+use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
 
 /// Repetitions of the best trial.
 const REPEATS: u64 = 4;
@@ -270,7 +270,7 @@ fn known(name: &str, jobs: usize, least_p_stand: Option<f64>) -> KnownTask {
     config.optimize.first.clear();
     let task = if continuous { Task::Forward } else { name.parse().expect("`tasks` are names of tasks or continuous") };
     let robot = RobotDescription::embedded("go1").expect("embedded");
-    let plan = prior_plan(&config, &robot, task).expect("fits the robot");
+    let plan = prior_plan(&config, &robot, task, Backend::Simulator).expect("fits the robot");
     let begun = std::time::Instant::now();
     let prior = simulate(&plan, jobs, &|_| {}, &AtomicBool::new(false)).expect("simulates");
     let simulated_s = begun.elapsed().as_secs_f64();

@@ -87,7 +87,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     require_descriptors()?;
     let maker = match options.config.optimize.sampler.kind {
         SamplerKind::Sim if options.prior.is_none() => {
-            Some(PriorMaker::new(&options.config, &options.robot, options.task)?)
+            Some(PriorMaker::new(&options.config, &options.robot, options.task, options.backend)?)
         }
         _ => None,
     };

@@ -13,6 +13,7 @@ use super::folder::fnv1a;
 use super::options::{EngineError, Options};
 use super::study::space_of;
 use crate::config::Config;
+use crate::control::settings::ControlSettings;
 use crate::optimize::prior::{Prior, PriorModel};
 use crate::optimize::space::Space;
 use crate::robot::description::{RobotDescription, read_text_within};
@@ -79,15 +80,23 @@ pub enum PriorFileError {
     Other { path: PathBuf },
 }
 
-/// Returns the inputs of the prior of `task` for a configured robot.
+/// Returns the inputs of the prior of `task` for a configured robot that is driven on `backend`: the simulated robots are controlled and
+/// judged by the same state, contact and limit of a fall in the air. By the estimate of hardware jumps fall that stand by the truth.
 ///
 /// # Errors
-/// When the task's settings do not fit the robot.
-pub fn prior_plan(config: &Config, robot: &RobotDescription, task: Task) -> Result<PriorPlan, EngineError> {
+/// When the task's settings do not fit robot and backend.
+pub fn prior_plan(
+    config: &Config,
+    robot: &RobotDescription,
+    task: Task,
+    backend: Backend,
+) -> Result<PriorPlan, EngineError> {
+    let ControlSettings { objective, flight_tilt_rad, .. } = config.settings(robot, task, backend)?;
+    let simulated = config.settings(robot, task, Backend::Simulator)?;
     Ok(PriorPlan {
         robot: robot.clone(),
         simulator: config.simulator.clone(),
-        settings: config.settings(robot, task, Backend::Simulator)?,
+        settings: ControlSettings { objective, flight_tilt_rad, ..simulated },
         control: *config.task(task),
         task,
         parameters: config.parameters(task),
@@ -103,14 +112,19 @@ pub struct PriorMaker {
 }
 
 impl PriorMaker {
-    /// The prior of `task` for a configured robot.
+    /// The prior of `task` for a configured robot that is driven on `backend` ([`prior_plan`]).
     ///
     /// # Errors
-    /// When the task's settings do not fit the robot.
-    pub fn new(config: &Config, robot: &RobotDescription, task: Task) -> Result<PriorMaker, EngineError> {
-        let plan = prior_plan(config, robot, task)?;
+    /// When the task's settings do not fit robot and backend.
+    pub fn new(
+        config: &Config,
+        robot: &RobotDescription,
+        task: Task,
+        backend: Backend,
+    ) -> Result<PriorMaker, EngineError> {
+        let plan = prior_plan(config, robot, task, backend)?;
         let space = space_of(&plan.parameters)?;
-        Ok(PriorMaker { plan, space, key: key(config, robot, task) })
+        Ok(PriorMaker { plan, space, key: key(config, robot, task, backend) })
     }
 
     /// Inputs of the prior.
@@ -119,7 +133,7 @@ impl PriorMaker {
     }
 
     /// Short name of everything that the prior depends on: the robot's files, the configuration without what belongs to screens
-    /// and samplers, the task with the bounds of its parameters, the version of the program. FNV-1a, 64 bits.
+    /// and samplers, the task with the bounds of its parameters, the backend, the version of the program. FNV-1a, 64 bits.
     pub fn key(&self) -> &str {
         &self.key
     }
@@ -262,12 +276,16 @@ fn checksum(prior: &Prior) -> u32 {
     crc32fast::hash(&serde_json::to_vec(prior).unwrap_or_default())
 }
 
-fn key(config: &Config, robot: &RobotDescription, task: Task) -> String {
+fn key(config: &Config, robot: &RobotDescription, task: Task, backend: Backend) -> String {
     let used = ["control.toml", "safety.toml", "simulator.toml", "prior.toml"];
     let files = config.as_run.iter().filter(|(name, _)| used.contains(&name.as_str())).chain(&robot.files);
     let bounds = |p: &ParameterInfo| format!("{} {:x} {:x};", p.name, p.low.to_bits(), p.high.to_bits());
     let parameters: String = config.parameters(task).iter().map(bounds).collect();
-    let source = config.optimize.objective.as_deref().unwrap_or_default();
+    // On hardware there is one source.
+    let source = match backend {
+        Backend::Simulator => config.optimize.objective.as_deref().unwrap_or_default(),
+        Backend::Hardware => backend.name(),
+    };
     let rest = format!("{} {} {source} {parameters}", env!("CARGO_PKG_VERSION"), task.name());
     let texts = files.flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
     fnv1a(texts.chain([rest.as_bytes()]))

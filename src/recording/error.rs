@@ -25,7 +25,7 @@ pub enum RecordingError {
         deeper.as_ref().map_or(String::new(), |deeper| format!(", for example {}", deeper.display()))
     )]
     NoRecording { path: PathBuf, deeper: Option<PathBuf> },
-    #[error("{}: not of the study of {}: {reason}; replay them one by one", path.display(), first.display())]
+    #[error("{}: not of the study of {}: {reason}; name one of them at a time", path.display(), first.display())]
     OtherStudy { path: PathBuf, first: PathBuf, reason: String },
     #[error("{}: the file is empty; nothing was recorded in it", path.display())]
     Empty { path: PathBuf },

@@ -83,7 +83,7 @@ fn the_points_are_those_of_a_study_with_the_same_results() {
 #[test]
 fn a_sampler_with_a_prior_predicts_its_first_point() {
     let mut options = options(SamplerKind::Sim);
-    let maker = PriorMaker::new(&options.config, &options.robot, options.task).unwrap();
+    let maker = PriorMaker::new(&options.config, &options.robot, options.task, options.backend).unwrap();
     options.prior = Some(maker.make(2, &|_| (), &AtomicBool::new(false)).unwrap().model);
     let mut served = AskTell::new(open_study(&options, Durability::Buffered).unwrap());
     let asked = answer(&mut served, r#"{"ask":{}}"#);

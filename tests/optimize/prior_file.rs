@@ -2,17 +2,20 @@
 
 use crate::attached_console;
 use std::fs;
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use attached_console::AttachedConsole;
 use quadfrog::config::{Config, ConfigLayer};
+use quadfrog::control::settings::ObjectiveSource;
 use quadfrog::engine::{EngineError, Options, PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, open_experiment};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::recording::record::{LogLevel, Record};
-use quadfrog::robot::description::RobotDescription;
+use quadfrog::robot::description::{RobotDescription, RobotFiles};
+use quadfrog::robot::hardware::Network;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{Backend, Task};
@@ -28,7 +31,7 @@ fn config(texts: &[(&str, &str)]) -> Config {
 
 fn maker(texts: &[(&str, &str)]) -> PriorMaker {
     let robot = RobotDescription::embedded("go1").unwrap();
-    PriorMaker::new(&config(&[&[SMALL], texts].concat()), &robot, Task::Forward).unwrap()
+    PriorMaker::new(&config(&[&[SMALL], texts].concat()), &robot, Task::Forward, Backend::Simulator).unwrap()
 }
 
 fn find_or_make(maker: &PriorMaker, files: &[PathBuf]) -> (ReadyPrior, Vec<String>) {
@@ -70,7 +73,7 @@ fn a_prior_is_kept_and_reused_until_something_changes_that_it_depends_on() {
         assert!(matches!(error, PriorFileError::Other { .. }), "{other:?}: {error}");
     }
     let robot = RobotDescription::embedded("a1").unwrap();
-    let a1 = PriorMaker::new(&config(&[SMALL]), &robot, Task::Forward).unwrap();
+    let a1 = PriorMaker::new(&config(&[SMALL]), &robot, Task::Forward, Backend::Simulator).unwrap();
     assert_ne!(a1.key(), maker(&[]).key());
 }
 
@@ -118,7 +121,7 @@ fn the_sampler_sim_is_never_without_a_prior() {
     assert!(matches!(refused, Err(EngineError::NoPrior)), "{refused:?}");
     // No jump without a vertical force stands: the sampler could only guess.
     let useless = [SMALL, ("optimize.toml", "[bounds]\nf0 = [0.75, 0.75]\nFz = [350.0, 350.0]\nFx = [150.0, 150.0]")];
-    let maker = PriorMaker::new(&config(&useless), &robot, Task::Forward).unwrap();
+    let maker = PriorMaker::new(&config(&useless), &robot, Task::Forward, Backend::Simulator).unwrap();
     let made = maker.make(2, &|_| (), &AtomicBool::new(false));
     assert!(matches!(&made, Err(EngineError::UnusablePrior(_))), "{made:?}");
 }
@@ -151,6 +154,33 @@ fn a_session_makes_its_prior_before_the_first_proposal_and_the_next_session_reus
     console.until_within(MOST, "a proposal", proposed);
     console.until_within(MOST, "the message", |c| logged(c, &format!("is that of {}", kept.display())));
     console.handle.shutdown();
+}
+
+/// Hardware has the estimate alone, by which jumps fall that stand by the simulator's truth: the prior of a session on a robot was that
+/// of the truth. The robot is silent; its prior is made all the same.
+#[test]
+fn the_prior_of_a_session_on_hardware_is_simulated_with_the_estimate() {
+    let folder = tempfile::tempdir().unwrap();
+    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let Some(Network::Go1(mut network)) = Network::read(&RobotFiles::embedded("go1").unwrap()).unwrap() else {
+        unreachable!()
+    };
+    (network.address, network.local_port) = (silent.local_addr().unwrap(), 0);
+    let simulated = session(folder.path(), SMALL.1);
+    let mut options = Options::new(simulated.config, simulated.robot, Backend::Hardware, Task::Forward);
+    (options.folder, options.network) = (simulated.folder, Some(Network::Go1(network)));
+    let made_for = |backend| PriorMaker::new(&options.config, &options.robot, Task::Forward, backend).unwrap();
+    let [on_simulator, on_hardware] = [Backend::Simulator, Backend::Hardware].map(made_for);
+    assert_eq!(on_hardware.plan().settings.objective, ObjectiveSource::Estimate);
+
+    let mut console = AttachedConsole::start(options);
+    console.until_within(MOST, "the message", |c| logged(c, "the prior of the sampler sim is made"));
+    console.handle.shutdown();
+    let kept = folder.path().join("study").join(PRIOR_FILE);
+    let read = on_hardware.read(&kept).unwrap();
+    assert!(matches!(on_simulator.read(&kept), Err(PriorFileError::Other { .. })));
+    let of_truth = on_simulator.make(2, &|_| (), &AtomicBool::new(false)).unwrap();
+    assert_ne!(read.model.prior().worlds, of_truth.model.prior().worlds);
 }
 
 /// A prior of hours: keys that move the robot, STOP and the end of the session do not wait for it, and nothing of it is kept.

@@ -13,7 +13,7 @@ use quadfrog::session::prior::{EnsembleError, PriorPlan, PriorProgress, draw_rob
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::{JumpParameters, ParameterValues, Task};
+use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task};
 
 fn go1() -> RobotDescription {
     RobotDescription::embedded("go1").unwrap()
@@ -29,7 +29,7 @@ const SMALL: &str = "worlds = 2\npoints = 16";
 
 fn small(task: Task, texts: &[(&str, &str)]) -> PriorPlan {
     let config = layered(&[&[("prior.toml", SMALL)], texts].concat()).unwrap();
-    prior_plan(&config, &go1(), task).unwrap()
+    prior_plan(&config, &go1(), task, Backend::Simulator).unwrap()
 }
 
 fn make(plan: &PriorPlan, jobs: usize) -> Prior {

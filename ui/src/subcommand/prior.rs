@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use crate::{notice, output, put_line};
 use clap::Args;
+use clap::builder::TypedValueParser;
 use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
@@ -15,7 +16,7 @@ use quadfrog::optimize::prior::World;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::cores;
 use quadfrog::session::prior::{PriorProgress, ensemble};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Backend, Task};
 use serde_json::json;
 
 use super::arguments::{self, whole_number};
@@ -33,6 +34,9 @@ pub struct PriorArguments {
     /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml
     #[arg(long, value_name = "MODEL", default_value = "go1", add = ArgValueCandidates::new(completion::robots))]
     model: String,
+    /// Machine of the studies: on hardware controller and objective have the estimate in place of the true state
+    #[arg(long, value_name = "WHICH", default_value = Backend::Simulator.name(), value_parser = backend())]
+    backend: Backend,
     /// File of the prior [default: in the folder priors of recordings, where new studies find it]
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -44,10 +48,17 @@ pub struct PriorArguments {
     json: bool,
 }
 
+fn backend() -> impl TypedValueParser<Value = Backend> {
+    arguments::one_of([
+        (Backend::Simulator, Backend::Simulator.name(), "The built-in simulator"),
+        (Backend::Hardware, Backend::Hardware.name(), "A robot over its network, or `quadfrog emulate`"),
+    ])
+}
+
 pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
     let (files, robot) = arguments::load_model(&arguments.model)?;
     let config = arguments::load_config_for(&files, arguments.config.as_deref())?;
-    let maker = PriorMaker::new(&config, &robot, arguments.task)?;
+    let maker = PriorMaker::new(&config, &robot, arguments.task, arguments.backend)?;
     let given = arguments.output.clone();
     let file = given.clone().unwrap_or_else(|| maker.shared_file(Path::new("recordings")));
     if let Some(given) = &given {
@@ -107,7 +118,7 @@ fn may_replace(maker: &PriorMaker, file: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Returns the prior of a task for a study: from one of `files`, or from the priors in `output`, or made now and kept there.
+/// Returns the prior of a task for a study on the simulator: from one of `files`, or from the priors in `output`, or made now and kept there.
 pub fn obtain(
     config: &Config,
     robot: &RobotDescription,
@@ -115,7 +126,7 @@ pub fn obtain(
     files: &[PathBuf],
     output: &Path,
 ) -> Result<ReadyPrior, Failure> {
-    let maker = PriorMaker::new(config, robot, task)?;
+    let maker = PriorMaker::new(config, robot, task, Backend::Simulator)?;
     let shared = maker.shared_file(output);
     let all: Vec<PathBuf> = files.iter().cloned().chain([shared.clone()]).collect();
     let ready = find_or_make(&maker, &all, cores())?;
