@@ -2,7 +2,9 @@
 //! members of the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `jobs`, `least_p_stand` (left out: that of the task's configuration). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
+//! `trials`, `seed`, `jobs`, `least_p_stand` (left out: that of the task's configuration), `backend` (`sim` or `hardware`, where the
+//! robots are controlled and judged by the estimate), `prior_backend` (left out: the same), `torque_limit` (a share for all robots; left
+//! out: drawn). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
 //! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`attainable`]): the largest of many noisy values would be
@@ -239,8 +241,8 @@ fn attainable(jumper: &mut Jumper<'_>, noise: u64, results: &[&StudyResult], lon
     Attainable { optimum, long: stood.map(|result| again(&result.point)).fold(0.0, f64::max) }
 }
 
-/// The robots: `count` - 3 from the ranges of the ensemble, the others outside of them.
-fn targets(plan: &PriorPlan, count: usize, seed: u32) -> Vec<Target> {
+/// The robots: `count` - 3 from the ranges of the ensemble, the others outside of them; all with `torque_limit`, where it is given.
+fn targets(plan: &PriorPlan, count: usize, seed: u32, torque_limit: Option<f64>) -> Vec<Target> {
     let drawn = |index: usize| draw_robot(&plan.ensemble.ranges, seed + index as u32);
     let target = |index: usize| {
         let (name, properties) = match count - index {
@@ -257,12 +259,13 @@ fn targets(plan: &PriorPlan, count: usize, seed: u32) -> Vec<Target> {
             ),
             _ => ("inside", drawn(index)),
         };
-        Target { name: format!("{name} {}", index + 1), properties }
+        let torque_limit = torque_limit.unwrap_or(properties.torque_limit);
+        Target { name: format!("{name} {}", index + 1), properties: RobotProperties { torque_limit, ..properties } }
     };
     (0..count).map(target).collect()
 }
 
-fn known(name: &str, jobs: usize, least_p_stand: Option<f64>) -> KnownTask {
+fn known(name: &str, jobs: usize, least_p_stand: Option<f64>, [backend, prior_backend]: [Backend; 2]) -> KnownTask {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let continuous = name == "continuous";
     let mut config = Config::load(continuous.then(|| root.join("examples/continuous")).as_deref()).expect("loads");
@@ -270,9 +273,10 @@ fn known(name: &str, jobs: usize, least_p_stand: Option<f64>) -> KnownTask {
     config.optimize.first.clear();
     let task = if continuous { Task::Forward } else { name.parse().expect("`tasks` are names of tasks or continuous") };
     let robot = RobotDescription::embedded("go1").expect("embedded");
-    let plan = prior_plan(&config, &robot, task, Backend::Simulator).expect("fits the robot");
+    let plan_for = |backend| prior_plan(&config, &robot, task, backend).expect("fits the robot");
+    let plan = plan_for(backend);
     let begun = std::time::Instant::now();
-    let prior = simulate(&plan, jobs, &|_| {}, &AtomicBool::new(false)).expect("simulates");
+    let prior = simulate(&plan_for(prior_backend), jobs, &|_| {}, &AtomicBool::new(false)).expect("simulates");
     let simulated_s = begun.elapsed().as_secs_f64();
     let mirror = |point: &Vec<f64>| point.iter().map(|u| 1.0 - u).collect();
     let mirrored = prior.points.iter().map(mirror).collect();
@@ -325,6 +329,9 @@ fn main() {
         ("seed", "9000"),
         ("jobs", ""),
         ("least_p_stand", ""),
+        ("backend", Backend::Simulator.name()),
+        ("prior_backend", ""),
+        ("torque_limit", ""),
     ]
     .map(|(key, value)| (key.to_owned(), value.to_owned()))
     .into();
@@ -338,8 +345,14 @@ fn main() {
     let (robots, studies, trials, seed) =
         (number("robots").max(4), number("studies"), number("trials"), number("seed"));
     let is_reached = |after: usize| AFTER[after] <= trials;
-    let least_p_stand = Some(&settings["least_p_stand"]).filter(|text| !text.is_empty());
-    let least_p_stand = least_p_stand.map(|text| text.parse().expect("`least_p_stand` is a number"));
+    let share = |key: &str| {
+        let given = Some(&settings[key]).filter(|text| !text.is_empty());
+        given.map(|text| text.parse::<f64>().unwrap_or_else(|_| panic!("`{key}` is a number")))
+    };
+    let (least_p_stand, torque_limit) = (share("least_p_stand"), share("torque_limit"));
+    let backend = |key: &str| settings[key].parse().unwrap_or_else(|_| panic!("`{key}` is sim or hardware"));
+    let prior_backend = if settings["prior_backend"].is_empty() { "backend" } else { "prior_backend" };
+    let backends = ["backend", prior_backend].map(backend);
     let wanted = &settings["samplers"];
     let proposers: Vec<Proposer> = Proposer::ALL
         .iter()
@@ -359,8 +372,8 @@ fn main() {
     println!("|---|---|{}---|---|---|", "---|".repeat(AFTER.len() + 1));
     let mut notes = String::new();
     for name in settings["tasks"].split(',') {
-        let task = known(name, jobs, least_p_stand);
-        let targets = targets(&task.plan, robots, seed as u32);
+        let task = known(name, jobs, least_p_stand, backends);
+        let targets = targets(&task.plan, robots, seed as u32, torque_limit);
         let mut work = Vec::new();
         for target in 0..robots {
             let job = |proposer, study| Job { target, proposer, study, trials, is_long: false };
