@@ -69,6 +69,12 @@ impl ExperimentView {
 /// Name of the wait for the prior of the sampler `sim`.
 const PRIOR: &str = "the simulated robots of the sampler sim";
 
+/// End of the log line of a wait for the storage; the place that the session waits for comes before it.
+pub const ANSWERS_LATER: &str = ": requests to the study are answered later; STOP, sit down and cancel do not wait";
+
+/// Begin of the log line of the end of that wait; its length follows.
+pub const ANSWERED_AFTER: &str = "the study answered after ";
+
 /// Wait of the session for the storage of its study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StorageWait {

@@ -8,6 +8,7 @@ use quadfrog::recording::record::{
 use quadfrog::report::table;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::session::operator_request::OperatorRequest;
+use quadfrog::session::storage::{ANSWERED_AFTER, ANSWERS_LATER};
 use quadfrog::telemetry::{
     ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TransitionCause, TrialInhibit,
 };
@@ -437,6 +438,24 @@ fn the_stop_of_an_observer_names_who_stopped() {
         console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
         assert_shows(&console.next_step(), &["STOPPED; check the robot, then k acknowledges: STOP by Grace"]);
     }
+}
+
+/// The warning of a wait for the simulated robots stayed in the last line after their prior was made.
+#[test]
+fn the_end_of_a_wait_for_the_study_takes_the_place_of_its_warning() {
+    let log =
+        |level, message: &str| Record::Log(LogRecord { level, source: "session".into(), message: message.into() });
+    let mut console = Console::ready();
+    console
+        .record(log(LogLevel::Warning, &format!("waiting for the simulated robots of the sampler sim{ANSWERS_LATER}")));
+    console.record(log(LogLevel::Info, "the prior of the sampler sim is made"));
+    assert!(console.said().ends_with(ANSWERS_LATER));
+    console.record(log(LogLevel::Info, &format!("{ANSWERED_AFTER}28.3 s")));
+    assert_eq!(console.said(), format!("{ANSWERED_AFTER}28.3 s"));
+
+    console.record(log(LogLevel::Warning, "motor FR hip 71 degrees Celsius"));
+    console.record(log(LogLevel::Info, &format!("{ANSWERED_AFTER}2.0 s")));
+    assert_eq!(console.said(), "motor FR hip 71 degrees Celsius", "another warning stays");
 }
 
 /// The result of confirming the best is part of the end of the study and of its tables.

@@ -9,7 +9,7 @@ use crate::recording::record::{LogLevel, Record, RequestRecord};
 use crate::session::experiment::Experiment;
 use crate::session::operator_request::StampedRequest;
 use crate::session::prior::PriorWork;
-use crate::session::storage::{FinishedJob, JobOutput, StorageWatch};
+use crate::session::storage::{ANSWERED_AFTER, ANSWERS_LATER, FinishedJob, JobOutput, StorageWatch};
 use crate::telemetry::{Command, CommandRefusal, Mode, TrialSpec};
 use crate::trial::{ExperimentStage, NOT_RUN};
 
@@ -212,15 +212,12 @@ impl Supervisor {
             (Some(given_ns), None) if time_ns >= given_ns + LOGGED_WAIT_NS => {
                 self.waited_since_ns = Some(given_ns);
                 let place = self.experiment.waits_for();
-                let message = format!(
-                    "waiting for {place}: requests to the study are answered later; STOP, sit down and cancel do not wait"
-                );
-                self.log(LogLevel::Warning, message, time_ns);
+                self.log(LogLevel::Warning, format!("waiting for {place}{ANSWERS_LATER}"), time_ns);
             }
             (front, Some(given_ns)) if front != Some(given_ns) => {
                 self.waited_since_ns = None;
                 let waited_s = time_ns.saturating_sub(given_ns) as f64 * 1e-9;
-                self.log(LogLevel::Info, format!("the study answered after {waited_s:.1} s"), time_ns);
+                self.log(LogLevel::Info, format!("{ANSWERED_AFTER}{waited_s:.1} s"), time_ns);
             }
             _ => {}
         }

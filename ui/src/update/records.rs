@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
+use quadfrog::session::storage::{ANSWERED_AFTER, ANSWERS_LATER};
 use quadfrog::telemetry::{Fault, Mode, TransitionCause};
 use quadfrog::trial::{
     Approval, ExperimentStage, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits,
@@ -226,7 +227,9 @@ fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
         Record::Request(command) => answer(model, time_ns, command),
         Record::Counters(counters) => model.snapshot.counters = counters,
         Record::Log(line) => {
-            if line.level > LogLevel::Info {
+            let waits = |shown: &Notice| shown.text.ends_with(ANSWERS_LATER);
+            let wait_ended = line.message.starts_with(ANSWERED_AFTER) && model.message.as_ref().is_some_and(waits);
+            if line.level > LogLevel::Info || wait_ended {
                 say(model, line.level, line.message.clone());
             }
             if line.source == "session" && line.message.starts_with(STOP_BY) {
