@@ -219,6 +219,18 @@ struct Differences {
     agreement: f64,
 }
 
+impl Differences {
+    /// The limits of whole jumps with the convex contact law.
+    #[track_caller]
+    fn assert_within_limits(&self) {
+        assert!(self.apex <= 1.0 && self.apex_95 <= 4.0, "apex");
+        assert!(self.takeoff_ms <= 5.0, "take-off");
+        assert!(self.landing_cm <= 3.0, "landing");
+        assert!(self.twist <= 5.0, "yaw of twists");
+        assert!(self.agreement >= 90.0, "falls");
+    }
+}
+
 impl std::fmt::Display for Differences {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
@@ -329,11 +341,7 @@ fn golden_jumps() {
     println!("golden_jumps: {} cases, convex law (as shipped): {convex}", file.cases.len());
 
     assert_eq!(config.contact.law, ContactLaw::Convex);
-    assert!(convex.apex <= 1.0 && convex.apex_95 <= 4.0, "apex");
-    assert!(convex.takeoff_ms <= 5.0, "take-off");
-    assert!(convex.landing_cm <= 3.0, "landing");
-    assert!(convex.twist <= 5.0, "yaw of twists");
-    assert!(convex.agreement >= 90.0, "falls");
+    convex.assert_within_limits();
     assert!(coulomb.apex <= 1.5 && coulomb.apex_95 <= 4.0, "apex with Coulomb's law");
     assert!(coulomb.landing_cm <= 4.0, "landing with Coulomb's law");
     assert!(coulomb.agreement >= 75.0, "falls with Coulomb's law");
@@ -346,11 +354,7 @@ fn golden_jumps_of_the_go2() {
     let (robot, config) = robot_setup("go2", &file);
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases of the Go2: {found}", file.cases.len());
-    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
-    assert!(found.takeoff_ms <= 5.0, "take-off");
-    assert!(found.landing_cm <= 3.0, "landing");
-    assert!(found.twist <= 5.0, "yaw of twists");
-    assert!(found.agreement >= 90.0, "falls");
+    found.assert_within_limits();
 }
 
 /// The attitude rate term and the foot placement do in this simulator what they do in MuJoCo.
@@ -361,11 +365,7 @@ fn golden_jumps_with_the_added_terms() {
     let (robot, config) = reference_setup(&file);
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases with the added terms: {found}", file.cases.len());
-    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
-    assert!(found.takeoff_ms <= 5.0, "take-off");
-    assert!(found.landing_cm <= 3.0, "landing");
-    assert!(found.twist <= 5.0, "yaw of twists");
-    assert!(found.agreement >= 90.0, "falls");
+    found.assert_within_limits();
 }
 
 /// The cut-off of the profile force and the spread of the swing feet do in this simulator what they do in MuJoCo.
@@ -377,11 +377,7 @@ fn golden_jumps_with_the_landing_terms() {
     let (robot, config) = reference_setup(&file);
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases with the landing terms: {found}", file.cases.len());
-    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
-    assert!(found.takeoff_ms <= 5.0, "take-off");
-    assert!(found.landing_cm <= 3.0, "landing");
-    assert!(found.twist <= 5.0, "yaw of twists");
-    assert!(found.agreement >= 90.0, "falls");
+    found.assert_within_limits();
 }
 
 /// The trials of this program on robots of a prior, with torque-speed curve, lag, rotors and friction in the joints, end as MuJoCo's jumps.
@@ -394,11 +390,7 @@ fn golden_jumps_of_robots_of_a_prior() {
     config.contact.fall_bodies.clear();
     let found = compare(&robot, &config, &file);
     println!("golden_jumps: {} cases of robots of a prior: {found}", file.cases.len());
-    assert!(found.apex <= 1.0 && found.apex_95 <= 4.0, "apex");
-    assert!(found.takeoff_ms <= 5.0, "take-off");
-    assert!(found.landing_cm <= 3.0, "landing");
-    assert!(found.twist <= 5.0, "yaw of twists");
-    assert!(found.agreement >= 90.0, "falls");
+    found.assert_within_limits();
 }
 
 /// Several jumps in a row; the landing's distance is that of the last one, divided by the number of jumps.

@@ -14,11 +14,7 @@ reference.URDF = reference.URDF.parents[2] / "robots/go2/go2.urdf"
 reference.ABDUCTION, reference.FOOT_RADIUS = 0.0955, 0.022
 reference.STANCE = reference.np.array([0.0, 0.1555, -0.25])
 reference.BOUNDS = dict(f0_hz=(0.75, 1.75), along_n=(0, 180), up_n=(180, 400))
-reference.TERMS = dict(
-    attitude_rate_gain=0.0,
-    foot_placement_s=0.0,
-    landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3),
-)
+reference.TERMS = reference.PAPER
 
 if __name__ == "__main__":
     reference.main()

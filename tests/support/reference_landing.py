@@ -29,6 +29,10 @@ TERMS = dict(
     foot_placement_s=0.08,
     landing=dict(cutoff="foot", cutoff_lost_s=0.02, spread_m=0.04, spread_s=0.3),
 )
+# The controller without added terms.
+PAPER = dict(
+    attitude_rate_gain=0.0, foot_placement_s=0.0, landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3)
+)
 BOUNDS = dict(f0_hz=(0.75, 1.75), along_n=(0, 150), up_n=(150, 350))
 TASKS = ["forward", "lateral-left", "twist-ccw"]
 
@@ -216,12 +220,28 @@ def jump(m, limits, case, terms, motors=ideal_motors, sensors=exact_sensors, con
     return expect
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def read_arguments(description, seed, cases):
+    """File to write, seed and number of cases of the command line."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("output", type=pathlib.Path)
-    parser.add_argument("--seed", type=int, default=20261122)
-    parser.add_argument("--cases", type=int, default=12)
-    arguments = parser.parse_args()
+    parser.add_argument("--seed", type=int, default=seed)
+    parser.add_argument("--cases", type=int, default=cases)
+    return parser.parse_args()
+
+
+def write(output, description, cases):
+    """Writes a golden file."""
+    head = dict(
+        note=" ".join(description.split()),
+        stance_m=dict(zip("xyz", STANCE.tolist())),
+        gains=dict(kp=KP, kd=KD, kd_joint=KD_JOINT, k_att=K_ATT),
+        floor_friction=1.0,
+    )
+    output.write_text(json.dumps(dict(head, cases=cases)) + "\n")
+
+
+def main():
+    arguments = read_arguments(__doc__, seed=20261122, cases=12)
     m, limits = model()
     random, cases = np.random.default_rng(arguments.seed), []
     for number in range(arguments.cases):
@@ -231,13 +251,7 @@ def main():
         case.update(terms=TERMS, expect=jump(m, limits, case, TERMS))
         cases.append(case)
         print(task, case["expect"], flush=True)
-    head = dict(
-        note=" ".join(__doc__.split()),
-        stance_m=dict(zip("xyz", STANCE.tolist())),
-        gains=dict(kp=KP, kd=KD, kd_joint=KD_JOINT, k_att=K_ATT),
-        floor_friction=1.0,
-    )
-    arguments.output.write_text(json.dumps(dict(head, cases=cases)) + "\n")
+    write(arguments.output, __doc__, cases)
 
 
 if __name__ == "__main__":

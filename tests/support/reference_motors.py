@@ -10,20 +10,14 @@ floor and motors of its own, with rotors, drawn from the ranges of config/prior.
 that stand or fall by the step of the physics (0.25 or 0.125 ms) are left out. SI units, radians, legs FR FL RR RL.
 """
 
-import argparse
-import json
-import pathlib
 import tomllib
 
 import numpy as np
-from reference_landing import BOUNDS, K_ATT, KD, KD_JOINT, KP, LEGS, STANCE, TASKS, URDF, joint_limits, jump, model
+from reference_landing import BOUNDS, LEGS, PAPER, TASKS, URDF, joint_limits, jump, model, read_arguments, write
 
 ROOT = URDF.parents[2]
 CONTROL = tomllib.loads((ROOT / "config/control.toml").read_text())
 RANGES = tomllib.loads((ROOT / "config/prior.toml").read_text())["ranges"]
-PAPER = dict(
-    attitude_rate_gain=0.0, foot_placement_s=0.0, landing=dict(cutoff="none", cutoff_lost_s=0.02, spread_m=0.0, spread_s=0.3)
-)
 
 
 class Motors:
@@ -73,11 +67,7 @@ def draw(random, number):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("output", type=pathlib.Path)
-    parser.add_argument("--seed", type=int, default=20261128)
-    parser.add_argument("--cases", type=int, default=30)
-    arguments = parser.parse_args()
+    arguments = read_arguments(__doc__, seed=20261128, cases=30)
     random, cases, left_out = np.random.default_rng(arguments.seed), [], 0
     while len(cases) < arguments.cases:
         case = draw(random, len(cases))
@@ -88,13 +78,7 @@ def main():
         cases.append(dict(case, expect=found))
         print(case["task"], found, flush=True)
     print(f"{left_out} left out")
-    head = dict(
-        note=" ".join(__doc__.split()),
-        stance_m=dict(zip("xyz", STANCE.tolist())),
-        gains=dict(kp=KP, kd=KD, kd_joint=KD_JOINT, k_att=K_ATT),
-        floor_friction=1.0,
-    )
-    arguments.output.write_text(json.dumps(dict(head, cases=cases)) + "\n")
+    write(arguments.output, __doc__, cases)
 
 
 if __name__ == "__main__":

@@ -18,8 +18,8 @@ import json
 import subprocess
 
 import numpy as np
-from reference_landing import jump, model
-from reference_motors import CONTROL, PAPER, RANGES, Motors, add_joints
+from reference_landing import PAPER, jump, model
+from reference_motors import CONTROL, RANGES, Motors, add_joints
 
 AFTER = [1, 3, 5, 10, 20]
 IN_A_ROW = 5
