@@ -204,4 +204,7 @@ pub struct Prediction {
     pub value: f64,
     /// Standard deviation of this mean, without the noise of a trial, in the objective's unit.
     pub deviation: f64,
+    /// Value by which trials that stood are compared for the best, in the objective's unit: the mean, less the risk of a fall where the
+    /// sampler knows it.
+    pub worth: f64,
 }

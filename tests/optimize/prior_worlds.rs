@@ -171,6 +171,17 @@ fn robots_of_an_ensemble_cover_every_range() {
     }
 }
 
+/// Where all robots are weaker than the description, the points at which they stand let a robot with its full torque fall.
+#[test]
+fn some_robots_of_the_default_ensemble_have_the_full_torque() {
+    let settings = Config::load(None).unwrap().prior;
+    let robots = ensemble(&settings);
+    let full = robots.iter().filter(|robot| robot.torque_limit >= 1.0).count();
+    assert!((1..robots.len()).contains(&full), "{full} of {} robots have the full torque", robots.len());
+    let drawn = (0..400).filter(|seed| draw_robot(&settings.ranges, *seed).torque_limit >= 1.0).count();
+    assert!((80..=120).contains(&drawn), "{drawn} of 400 robots have the full torque");
+}
+
 #[test]
 fn properties_change_the_robot_and_its_world_alone() {
     let ranges = Config::load(None).unwrap().prior.ranges;

@@ -457,6 +457,23 @@ fn the_insight_finds_the_robot_among_the_worlds_and_its_share_of_them() {
     assert!(learned.rho.mean < 1.0 && learned.bias.mean < 0.0, "{:?} {:?}", learned.rho, learned.bias);
 }
 
+/// A jump that stood where all simulated robots fall is not the best by a little more of the value: repeated it may fall.
+#[test]
+fn a_jump_that_stood_by_luck_is_not_the_best_by_a_little_more() {
+    for (gain, best) in [(1.1, 0), (3.0, 1)] {
+        let mut study = right(0);
+        for (u, value) in [([0.5, 0.7, 0.9], 0.4), ([0.5, 0.9, 0.1], gain * 0.4)] {
+            let values = study.options().space.parameters().iter().zip(u);
+            let given: Vec<(String, f64)> = values.map(|(p, u)| (p.name.clone(), p.range.unscale(u))).collect();
+            let number = study.begin(&study.draft_with(&given), &[], &[]).unwrap();
+            finish(&mut study, number, Some(value));
+        }
+        let predicted = study.predict();
+        println!("{predicted:?}");
+        assert_eq!(predicted.best.unwrap().trial, best, "{gain} times the value: {:?}", predicted.trials);
+    }
+}
+
 #[test]
 fn one_to_six_parameters_are_searched() {
     for d in [1, 6] {

@@ -83,7 +83,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
     let Some(model) = Acquisition::of(ask, &training) else { return Vec::new() };
     let prediction = |((trial, stood), point): ((&u32, &bool), &Vec<f64>)| {
         let Expectation { value, deviation, .. } = model.expectation(point, ask.direction);
-        Prediction { trial: *trial, stood: *stood, value, deviation }
+        Prediction { trial: *trial, stood: *stood, value, deviation, worth: value }
     };
     training.numbers.iter().zip(&training.stood).zip(&training.points).map(prediction).collect()
 }

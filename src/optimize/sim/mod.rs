@@ -50,7 +50,8 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, .. } =
                 expectation(ask.direction, ensemble, &jump.point, &prediction, true);
-            Prediction { trial: jump.number, stood: jump.stood, value, deviation }
+            let worth = in_own_unit(ask.direction, ensemble, acquisition.worth(&prediction));
+            Prediction { trial: jump.number, stood: jump.stood, value, deviation, worth }
         };
         Some(history.jumps.iter().map(prediction).collect())
     };
@@ -106,12 +107,18 @@ fn expectation(
         Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
     });
     Expectation {
-        value: own_sign(ensemble.offset + ensemble.scale * prediction.mean),
+        value: in_own_unit(direction, ensemble, prediction.mean),
         deviation: ensemble.scale * sqrt(prediction.variance),
         p_stand: prediction.p_stand,
         worlds,
         worth_the_risk,
     }
+}
+
+/// A scaled value in the objective's unit and sign.
+fn in_own_unit(direction: Direction, ensemble: &Ensemble, scaled: f64) -> f64 {
+    let value = ensemble.offset + ensemble.scale * scaled;
+    if direction == Direction::Maximize { value } else { -value }
 }
 
 /// The part of the prior's unit cube that is searched.

@@ -139,6 +139,14 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, features) }
     }
 
+    /// Scaled value by which a jump that stood is compared for the best: the mean, counted from the value of a fall, times the root of P.
+    /// The whole P would be too much: it is too low about jumps that stood.
+    pub fn worth(&self, prediction: &PointPrediction) -> f64 {
+        let gain = prediction.mean - self.origin;
+        // Below the value of a fall the risk of one is no loss.
+        self.origin + gain.min(gain * sqrt(prediction.p_stand))
+    }
+
     /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not
     /// worth their risk the one of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that
     /// stands makes points beyond it sure. It is counted from the incumbent: near void points the merit is reduced, and of a merit

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// User attribute of a study: the best trial by the sampler's model, a [`ModelBest`].
 pub(super) const MODEL_BEST: &str = "model_best";
 
-/// The trial of the largest predicted mean among those that stood. The largest value of a noisy objective is that of a lucky
-/// jump, and is not reached again.
+/// The trial of the best predicted mean among those that stood, with `sim` less the risk of a fall ([`Prediction::worth`]). The largest
+/// value of a noisy objective is that of a lucky jump, and is not reached again.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ModelBest {
     /// Its number.
@@ -47,9 +47,9 @@ impl Study {
     /// Returns the predictions of the sampler's model of the finished trials.
     pub fn predict(&self) -> ModelPredictions {
         let trials = sampler::predict(&self.ask(&[]));
-        let best_first = |a: &&Prediction, b: &&Prediction| self.options.direction.best_first(a.value, b.value);
+        let best_first = |a: &&Prediction, b: &&Prediction| self.options.direction.best_first(a.worth, b.worth);
         let best =
-            trials.iter().filter(|prediction| prediction.stood && prediction.value.is_finite()).min_by(best_first);
+            trials.iter().filter(|prediction| prediction.stood && prediction.worth.is_finite()).min_by(best_first);
         let best = best.map(|best| ModelBest {
             trial: best.trial,
             predicted: best.value,
