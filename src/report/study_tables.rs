@@ -170,7 +170,7 @@ pub fn best(group: &[&ReportedStudy]) -> Table {
         Column::number("air", "s"),
     ]);
     let chosen = if by_model {
-        " With a model of the sampler that of the best mean by the model: a single jump may be luck."
+        " With a model of the sampler the best one by this model: a single jump may be luck."
     } else {
         ""
     };

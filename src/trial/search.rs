@@ -93,7 +93,7 @@ pub struct ProposalInsight {
     pub parameters: Vec<ParameterInsight>,
     /// Predictions of the sampler's model of the finished trials, in the order of their numbers; empty without a model.
     pub predicted: Vec<PredictedTrial>,
-    /// The trial that is the best by the model: the largest mean among those that stood, since a single jump may be lucky.
+    /// The trial that is the best by the model among those that stood: a single jump may be lucky.
     pub best: Option<u32>,
     /// Comparison of the robot with the simulator; none for a sampler without a prior.
     pub simulator: Option<SimulatorComparison>,
