@@ -20,7 +20,7 @@
 ("EventIndex", &[("offset", "", "bytes of the file before the attachment; elsewhere the index is of another file"), ("events", ".frog.v1.EventIndex.Event", "in the order of the file")]),
 ("PreArm", &[("items", ".frog.v1.PreArm.Item", "")]),
 ("Search", &[("budget", "", "trials that count"), ("counted", "", ""), ("parameters", ".frog.v1.Search.Parameter", ""), ("confirming", "", "repeats left to confirm the best; none while no confirmation runs"), ("hop_share", "", "share of the force bounds open to trials on the robot; none: all of them"), ("queue", ".frog.v1.Search.Queued", "the next one first")]),
-("Insight", &[("trial", "", ""), ("parameters", ".frog.v1.Insight.Parameter", ""), ("predicted", ".frog.v1.Insight.Predicted", "finished trials by number; none for a sampler without a model"), ("best", "", "best trial by the predictions, among those that stood"), ("simulator", ".frog.v1.Insight.Simulator", "")]),
+("Insight", &[("trial", "", ""), ("parameters", ".frog.v1.Insight.Parameter", ""), ("predicted", ".frog.v1.Insight.Predicted", "finished trials by number; none for a sampler without a model"), ("best", "", "trial of the largest predicted mean among those that stood"), ("simulator", ".frog.v1.Insight.Simulator", "")]),
 ("Points", &[("points", ".frog.v1.Points.Point", "")]),
 ("Proposal.Parameter", &[("name", "", ""), ("value", "", "value that runs on approval"), ("proposed", "", "value of the sampler or the queue")]),
 ("Trial.Parameter", &[("name", "", ""), ("value", "", "in the parameter's unit")]),

@@ -1469,7 +1469,7 @@ pub struct Insight {
     /// finished trials by number; none for a sampler without a model
     #[prost(message, repeated, tag = "3")]
     pub predicted: ::prost::alloc::vec::Vec<insight::Predicted>,
-    /// best trial by the predictions, among those that stood
+    /// trial of the largest predicted mean among those that stood
     #[prost(uint32, optional, tag = "4")]
     pub best: ::core::option::Option<u32>,
     #[prost(message, optional, tag = "5")]

@@ -25,6 +25,11 @@ impl Direction {
         let ascending = a.partial_cmp(&b).unwrap_or(Ordering::Equal);
         if self == Direction::Maximize { ascending.reverse() } else { ascending }
     }
+
+    /// Returns a value of the objective with the sign by which larger is better, or one with that sign as the objective's.
+    pub fn maximized(self, value: f64) -> f64 {
+        if self == Direction::Maximize { value } else { -value }
+    }
 }
 
 /// The algorithm that proposes candidates.

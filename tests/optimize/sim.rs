@@ -8,7 +8,7 @@ use quadfrog::optimize::prior::terms::Features;
 use quadfrog::optimize::prior::{Prior, PriorModel, World};
 use quadfrog::optimize::sim::insight::insight;
 use quadfrog::optimize::space::{Parameter, Range, Space};
-use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions};
+use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions, TrialDraft};
 use serde::Deserialize;
 use simulated::{Formula, WORLDS, finish, jump, jumps, mirrored, prior_of, space, unit};
 use std::sync::{Arc, LazyLock};
@@ -40,11 +40,22 @@ fn points(study: &Study) -> Vec<Vec<(String, f64)>> {
     study.trials().iter().map(|t| t.parameters.clone()).collect()
 }
 
-/// The expectation at a point of the unit cube.
-fn expected_at(study: &Study, u: &[f64]) -> Expectation {
+/// A draft at a point of the unit cube.
+fn draft_at(study: &Study, u: &[f64]) -> TrialDraft {
     let given: Vec<(String, f64)> =
         study.options().space.parameters().iter().zip(u).map(|(p, u)| (p.name.clone(), p.range.unscale(*u))).collect();
-    study.draft_with(&given).expected.unwrap()
+    study.draft_with(&given)
+}
+
+/// Runs a trial at a point of the unit cube; a fall without a value.
+fn jump_at(study: &mut Study, u: &[f64], value: Option<f64>) {
+    let number = study.begin(&draft_at(study, u), &[], &[]).unwrap();
+    finish(study, number, value);
+}
+
+/// The expectation at a point of the unit cube.
+fn expected_at(study: &Study, u: &[f64]) -> Expectation {
+    draft_at(study, u).expected.unwrap()
 }
 
 #[derive(Deserialize)]
@@ -81,16 +92,12 @@ struct GoldenPrediction {
 fn predictions_equal_dense_linear_algebra() {
     let golden: Golden = serde_json::from_str(include_str!("../golden/sim_prior.json")).unwrap();
     let space = Space::new(golden.prior.parameters.iter().map(|p| (p.name.clone(), p.range))).unwrap();
-    let mut study = in_memory(options(space.clone(), sampler(SamplerKind::Sim, 0)));
+    let mut study = in_memory(options(space, sampler(SamplerKind::Sim, 0)));
     study.use_prior(Arc::new(PriorModel::new(golden.prior)));
     let mut largest = 0.0_f64;
     for after in golden.after {
         for trial in &golden.trials[study.trials().len()..after.trials] {
-            let given: Vec<(String, f64)> = (space.parameters().iter().zip(&trial.unit))
-                .map(|(p, u)| (p.name.clone(), p.range.unscale(*u)))
-                .collect();
-            let number = study.begin(&study.draft_with(&given), &[], &[]).unwrap();
-            finish(&mut study, number, (!trial.fell).then_some(trial.value));
+            jump_at(&mut study, &trial.unit, (!trial.fell).then_some(trial.value));
         }
         for reference in after.predictions {
             let expected = expected_at(&study, &reference.unit);
@@ -317,6 +324,8 @@ fn a_minimized_study_is_the_mirror_of_a_maximized_one() {
         finish(&mut down, number, value.map(|value| -value));
     }
     assert_eq!(points(&up), points(&down));
+    let best = |study: &Study| study.predict().best.unwrap();
+    assert_eq!((best(&up).trial, best(&up).predicted), (best(&down).trial, -best(&down).predicted));
 }
 
 #[test]
@@ -462,14 +471,9 @@ fn the_insight_finds_the_robot_among_the_worlds_and_its_share_of_them() {
 fn a_jump_that_stood_by_luck_is_not_the_best_by_a_little_more() {
     for (gain, best) in [(1.1, 0), (3.0, 1)] {
         let mut study = right(0);
-        for (u, value) in [([0.5, 0.7, 0.9], 0.4), ([0.5, 0.9, 0.1], gain * 0.4)] {
-            let values = study.options().space.parameters().iter().zip(u);
-            let given: Vec<(String, f64)> = values.map(|(p, u)| (p.name.clone(), p.range.unscale(u))).collect();
-            let number = study.begin(&study.draft_with(&given), &[], &[]).unwrap();
-            finish(&mut study, number, Some(value));
-        }
+        jump_at(&mut study, &[0.5, 0.7, 0.9], Some(0.4));
+        jump_at(&mut study, &[0.5, 0.9, 0.1], Some(gain * 0.4));
         let predicted = study.predict();
-        println!("{predicted:?}");
         assert_eq!(predicted.best.unwrap().trial, best, "{gain} times the value: {:?}", predicted.trials);
     }
 }

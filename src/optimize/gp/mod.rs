@@ -121,7 +121,7 @@ impl TrainingSet {
                     set.numbers.push(trial.number);
                     set.stood.push(!trial.is_fall());
                     if !trial.is_fall() {
-                        set.values.push(if ask.direction == Direction::Maximize { value } else { -value });
+                        set.values.push(ask.direction.maximized(value));
                     }
                 }
                 _ => {}
@@ -197,7 +197,7 @@ impl Acquisition {
     /// probability of standing is 1.
     fn expectation(&self, x: &[f64], direction: Direction) -> Expectation {
         let (mean, deviation) = self.process.predict(x);
-        let value = if direction == Direction::Maximize { mean } else { -mean };
+        let value = direction.maximized(mean);
         let p_stand = self.stand_probability.as_ref().map_or(1.0, |s| s.probability(x));
         Expectation { value, deviation, p_stand, worlds: None, worth_the_risk: true }
     }

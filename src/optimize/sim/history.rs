@@ -49,7 +49,7 @@ impl History {
                 (TrialState::Fail, _) => history.void.push(point),
                 (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
                     let features = ensemble.features(prior.prior(), &point);
-                    let value = if direction == Direction::Maximize { value } else { -value };
+                    let value = direction.maximized(value);
                     let stood = !trial.is_fall();
                     history.jumps.push(Jump { number: trial.number, point, features, stood, value });
                 }

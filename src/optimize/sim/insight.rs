@@ -47,7 +47,6 @@ pub struct PriorInsight {
 pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Option<PriorInsight> {
     let ensemble = prior.ensemble()?;
     let history = History::gather(prior, ensemble, trials, direction);
-    let sign = if direction == Direction::Maximize { 1.0 } else { -1.0 };
     let about = ValueModel::fit(ensemble, &history)?;
     let coefficients = about.coefficients();
     let worlds = weights(prior, ensemble, &history);
@@ -58,7 +57,7 @@ pub fn insight(prior: &PriorModel, trials: &[Trial], direction: Direction) -> Op
     };
     Some(PriorInsight {
         rho: estimate(coefficients[1], 1.0),
-        bias: estimate(coefficients[0], sign * ensemble.scale),
+        bias: estimate(coefficients[0], direction.maximized(ensemble.scale)),
         worlds,
         log_bayes_factor: checked.log_bayes_factor,
         trusted: checked.trusted,

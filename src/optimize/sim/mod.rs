@@ -101,8 +101,7 @@ fn expectation(
     prediction: &PointPrediction,
     worth_the_risk: bool,
 ) -> Expectation {
-    let own_sign = |value: f64| if direction == Direction::Maximize { value } else { -value };
-    let worlds = ensemble.world_values(unit).into_iter().map(own_sign);
+    let worlds = ensemble.world_values(unit).into_iter().map(|value| direction.maximized(value));
     let worlds = worlds.fold(None, |range: Option<(f64, f64)>, value| {
         Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
     });
@@ -117,8 +116,7 @@ fn expectation(
 
 /// A scaled value in the objective's unit and sign.
 fn in_own_unit(direction: Direction, ensemble: &Ensemble, scaled: f64) -> f64 {
-    let value = ensemble.offset + ensemble.scale * scaled;
-    if direction == Direction::Maximize { value } else { -value }
+    direction.maximized(ensemble.offset + ensemble.scale * scaled)
 }
 
 /// The part of the prior's unit cube that is searched.
