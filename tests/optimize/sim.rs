@@ -183,6 +183,35 @@ fn proposals_stand_as_surely_as_the_key_asks() {
     assert_ne!(proposals(0.85), proposals(0.75));
 }
 
+/// P EI > 0.2 J* (1 - P) at each proposal that is worth its risk, by the model's own expectations.
+#[test]
+fn a_small_gain_is_not_worth_the_risk_of_a_fall() {
+    let (mut worth, mut closest) = (0, f64::INFINITY);
+    for seed in 0..8 {
+        let mut study = right(seed);
+        for _ in 0..6 {
+            let expected = study.draft().expected.unwrap();
+            let stood = study.predict().trials.into_iter().filter(|prediction| prediction.stood);
+            // Those that stood by luck are no incumbent.
+            let sure = stood.filter(|p| expected_at(&study, &unit(&study, p.trial)).p_stand >= 0.5);
+            if let Some(incumbent) = sure.map(|prediction| prediction.value).reduce(f64::max)
+                && expected.worth_the_risk
+            {
+                let t = (expected.value - incumbent) / expected.deviation;
+                let density = libm::exp(-0.5 * t * t) / libm::sqrt(std::f64::consts::TAU);
+                let below = 0.5 * libm::erfc(-t / std::f64::consts::SQRT_2);
+                let gain = expected.deviation * (density + t * below);
+                let price = 0.2 * incumbent * (1.0 - expected.p_stand);
+                closest = closest.min(expected.p_stand * gain / price);
+                worth += 1;
+            }
+            jump(&mut study, &ROBOT);
+        }
+    }
+    println!("{worth} proposals worth their risk, the least by {closest:.2} times its price");
+    assert!(worth >= 5 && closest > 1.0, "{worth} {closest}");
+}
+
 /// After 10 jumps within 10 % of `gp`, whose first points are free of the simulator.
 #[test]
 fn a_mirrored_simulator_is_left_for_the_values_that_contradict_it() {

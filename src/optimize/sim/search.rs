@@ -11,7 +11,7 @@ use libm::{exp, expm1, log, pow, sqrt};
 use std::cmp::Ordering;
 
 /// lambda: price of a fall, as a share of the incumbent's value.
-const PRICE: f64 = 0.05;
+const PRICE: f64 = 0.2;
 /// Factor of the price for each fall in a row.
 const ESCALATION: f64 = 10.0;
 /// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
