@@ -142,16 +142,7 @@ fn values_tell_where_the_robot_stands() {
     let p_stand = |robot: Formula| {
         let mut study = study_with(&prior, 0);
         for u in [[0.55, 0.0, 0.6], [0.55, 0.4, 0.8], [0.55, 0.75, 1.0]] {
-            let given: Vec<_> = study
-                .options()
-                .space
-                .parameters()
-                .iter()
-                .zip(u)
-                .map(|(p, u)| (p.name.clone(), p.range.unscale(u)))
-                .collect();
-            let number = study.begin(&study.draft_with(&given), &[], &[]).unwrap();
-            finish(&mut study, number, Some(robot.jump(&u).expect("within the least grip")));
+            jump_at(&mut study, &u, Some(robot.jump(&u).expect("within the least grip")));
         }
         // Ratio of forces 0.5, between the grips of the second and the third world.
         expected_at(&study, &[0.55, 0.9, 0.6]).p_stand
