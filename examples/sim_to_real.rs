@@ -2,7 +2,7 @@
 //! members of the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `jobs`, `least_p_stand` (left out: that of the task's configuration), `backend` (`sim` or `hardware`, where the
+//! `trials`, `seed`, `jobs`, `least_p_stand` and `fall_price` (left out: those of the task's configuration), `backend` (`sim` or `hardware`, where the
 //! robots are controlled and judged by the estimate), `prior_backend` (left out: the same), `torque_limit` (a share for all robots; left
 //! out: drawn). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
@@ -265,7 +265,12 @@ fn targets(plan: &PriorPlan, count: usize, seed: u32, torque_limit: Option<f64>)
     (0..count).map(target).collect()
 }
 
-fn known(name: &str, jobs: usize, least_p_stand: Option<f64>, [backend, prior_backend]: [Backend; 2]) -> KnownTask {
+fn known(
+    name: &str,
+    jobs: usize,
+    [least_p_stand, fall_price]: [Option<f64>; 2],
+    [backend, prior_backend]: [Backend; 2],
+) -> KnownTask {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let continuous = name == "continuous";
     let mut config = Config::load(continuous.then(|| root.join("examples/continuous")).as_deref()).expect("loads");
@@ -283,8 +288,9 @@ fn known(name: &str, jobs: usize, least_p_stand: Option<f64>, [backend, prior_ba
     let mirrored = Prior::new(prior.parameters.clone(), mirrored, prior.worlds.clone(), prior.slip.clone());
     let space =
         Space::new(plan.parameters.iter().map(|p| (p.name.clone(), Range::linear(p.low, p.high)))).expect("a space");
-    let mut sampler = config.optimize.sampler;
+    let mut sampler = config.sampler(task);
     sampler.least_p_stand = least_p_stand.unwrap_or(sampler.least_p_stand);
+    sampler.fall_price = fall_price.unwrap_or(sampler.fall_price);
     let mut task = KnownTask {
         name: name.to_owned(),
         sampler,
@@ -329,6 +335,7 @@ fn main() {
         ("seed", "9000"),
         ("jobs", ""),
         ("least_p_stand", ""),
+        ("fall_price", ""),
         ("backend", Backend::Simulator.name()),
         ("prior_backend", ""),
         ("torque_limit", ""),
@@ -349,7 +356,7 @@ fn main() {
         let given = Some(&settings[key]).filter(|text| !text.is_empty());
         given.map(|text| text.parse::<f64>().unwrap_or_else(|_| panic!("`{key}` is a number")))
     };
-    let (least_p_stand, torque_limit) = (share("least_p_stand"), share("torque_limit"));
+    let (risk, torque_limit) = (["least_p_stand", "fall_price"].map(share), share("torque_limit"));
     let backend = |key: &str| settings[key].parse().unwrap_or_else(|_| panic!("`{key}` is sim or hardware"));
     let prior_backend = if settings["prior_backend"].is_empty() { "backend" } else { "prior_backend" };
     let backends = ["backend", prior_backend].map(backend);
@@ -372,7 +379,7 @@ fn main() {
     println!("|---|---|{}---|---|---|", "---|".repeat(AFTER.len() + 1));
     let mut notes = String::new();
     for name in settings["tasks"].split(',') {
-        let task = known(name, jobs, least_p_stand, backends);
+        let task = known(name, jobs, risk, backends);
         let targets = targets(&task.plan, robots, seed as u32, torque_limit);
         let mut work = Vec::new();
         for target in 0..robots {

@@ -119,6 +119,8 @@ fn a_key_that_the_defaults_leave_out_may_be_given() {
     let config = Config::load(Some(folder.path())).unwrap();
     assert_eq!((config.optimize.sampler.startup_trials, config.optimize.sampler.least_p_stand), (Some(5), 0.9));
     refuses("optimize.toml", "[sampler]\nleast_p_stand = 1.0\n", &["sampler.least_p_stand", "0.99"]);
+    refuses("optimize.toml", "[fall_price]\nforward = -0.1\n", &["fall_price.forward", "0 to 10"]);
+    refuses("optimize.toml", "[fall_price]\nlateral_left = 0.1\n", &["unknown key `fall_price.lateral_left`"]);
     refuses("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n", &["sampler.startup_trials", "whole number"]);
 }
 

@@ -13,7 +13,7 @@ use super::merge::{FileOrigin, lookup, merge};
 use super::ranges;
 use crate::control::force_profile::second_direction;
 use crate::control::settings::{ControlSettings, ObjectiveSource, StandSettings, TaskControl};
-use crate::optimize::ask::SamplerKind;
+use crate::optimize::ask::{SamplerConfig, SamplerKind};
 use crate::realtime::scheduling::Scheduling;
 use crate::recording::record::HealthLimits;
 use crate::robot::GRAVITY;
@@ -154,6 +154,11 @@ impl Config {
             sampler.insert("kind".to_owned(), name);
             *text = table.to_string();
         }
+    }
+
+    /// Returns the settings of the sampler for `task`.
+    pub fn sampler(&self, task: Task) -> SamplerConfig {
+        SamplerConfig { fall_price: self.optimize.fall_price[task.name()], ..self.optimize.sampler.clone() }
     }
 
     /// Returns the controller's settings of `task`'s trials.

@@ -70,6 +70,8 @@ pub struct OptimizeFile {
     pub bounds: BTreeMap<String, [f64; 2]>,
     pub parameters: BTreeMap<String, Vec<String>>,
     pub sampler: SamplerConfig,
+    /// Price of a fall in each task ([`SamplerConfig::fall_price`]).
+    pub fall_price: BTreeMap<String, f64>,
     pub confirm: ConfirmFile,
     pub workers: WorkersFile,
     /// First point of a new study of each task, as `export to config` writes it.

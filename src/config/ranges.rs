@@ -235,6 +235,7 @@ const OPTIMIZE: &[Row] = &[
     (&["sampler.startup_trials"], within!(0, 1e6, "trials")),
     (&["sampler.least_p_stand"], within!(0, 0.99)),
     (&["sampler.seed"], within!(0, 4294967295.0)),
+    (&["fall_price.*"], within!(0, 10)),
     (&["workers.abandoned_s"], within!(0.1, 604800, "s")),
     (&["confirm.contenders"], within!(2, 10, "points")),
     (&["confirm.confidence"], within!(0.501, 0.9999)),

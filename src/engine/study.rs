@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::folder::STUDY_FILE;
 use super::options::{EngineError, Options};
-use crate::optimize::ask::{Direction, SamplerKind};
+use crate::optimize::ask::{Direction, SamplerConfig, SamplerKind};
 use crate::optimize::journal::Durability;
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
@@ -100,8 +100,7 @@ fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, Eng
 pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = space_of(&parameters)?;
-    let mut sampler = options.config.optimize.sampler.clone();
-    sampler.seed = options.seed;
+    let sampler = SamplerConfig { seed: options.seed, ..options.config.sampler(options.task) };
     let storage = storage(options);
     let mut study = Study::open(
         storage,

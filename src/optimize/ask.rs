@@ -79,6 +79,9 @@ pub struct SamplerConfig {
     pub candidates: usize,
     /// `sim`: probability of standing, 0..1, below which no gain is worth a jump (`src/optimize/README.md`, "Ask").
     pub least_p_stand: f64,
+    /// `sim`: price of a fall, as a share of the predicted value of the best jump so far. In `config/optimize.toml` each task has its own.
+    #[serde(skip_deserializing)]
+    pub fall_price: f64,
 }
 
 impl Default for SamplerConfig {
@@ -90,6 +93,7 @@ impl Default for SamplerConfig {
             startup_trials: None,
             candidates: 24,
             least_p_stand: 0.75,
+            fall_price: 0.2,
         }
     }
 }

@@ -80,6 +80,20 @@ fn the_points_are_those_of_a_study_with_the_same_results() {
     }
 }
 
+/// The price of a fall is that of the task in the configuration, and on record.
+#[test]
+fn a_study_has_the_price_of_a_fall_of_its_task() {
+    let layer = ConfigLayer { file: "optimize.toml", origin: "the test", text: "[fall_price]\ntwist-cw = 0.3" };
+    let config = Config::layered(&[layer]).unwrap();
+    for (task, price) in [(Task::Forward, 0.05), (Task::LateralRight, 0.2), (Task::TwistCw, 0.3)] {
+        let study =
+            open_study(&Options { config: config.clone(), task, ..options(SamplerKind::Gp) }, Durability::Buffered);
+        let study = study.unwrap();
+        assert_eq!(study.options().sampler.fall_price, price, "{task:?}");
+        assert_eq!(study.attributes()["sampler"]["fall_price"], json!(price), "{task:?}");
+    }
+}
+
 #[test]
 fn a_sampler_with_a_prior_predicts_its_first_point() {
     let mut options = options(SamplerKind::Sim);

@@ -45,7 +45,7 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
         let ensemble = prior.ensemble()?;
         let history = History::gather(prior, ensemble, ask.trials, ask.direction);
         let models = models(ensemble, &history)?;
-        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[], ask.config.least_p_stand)?;
+        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[], ask.config)?;
         let prediction = |jump: &Jump| {
             let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, .. } =
@@ -72,8 +72,7 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition =
-        Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config.least_p_stand)?;
+    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {

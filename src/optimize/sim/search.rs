@@ -2,7 +2,7 @@
 
 use super::history::History;
 use super::model::{StandingModel, ValueModel};
-use crate::optimize::ask::Streams;
+use crate::optimize::ask::{SamplerConfig, Streams};
 use crate::optimize::gp::{VOID_RADIUS, log_improvement};
 use crate::optimize::prior::Prior;
 use crate::optimize::prior::terms::{Ensemble, Features};
@@ -10,8 +10,6 @@ use crate::optimize::sobol::Sobol;
 use libm::{exp, expm1, log, pow, sqrt};
 use std::cmp::Ordering;
 
-/// lambda: price of a fall, as a share of the incumbent's value.
-const PRICE: f64 = 0.2;
 /// Factor of the price for each fall in a row.
 const ESCALATION: f64 = 10.0;
 /// Probability of standing from which a jump that stood can be the incumbent: one that stood by luck is none.
@@ -55,8 +53,8 @@ pub struct Acquisition<'a> {
     star: f64,
     /// The value of a fall, scaled: 0, or the lowest value of the worlds where values are negative.
     origin: f64,
-    /// 10^c for c falls in a row.
-    escalation: f64,
+    /// lambda 10^c for c falls in a row: price of a fall, as a share of J*.
+    price: f64,
     /// Probability of standing below which no gain is worth a jump.
     least: f64,
     void: Vec<Vec<f64>>,
@@ -104,14 +102,13 @@ impl Scored {
 }
 
 impl<'a> Acquisition<'a> {
-    /// Computes incumbent and price from the fitted models. `candidates` count for J* before the first jump that stood; `least` is the
-    /// probability of standing below which no gain is worth a jump.
+    /// Computes incumbent and price from the fitted models. `candidates` count for J* before the first jump that stood.
     pub fn new(
         (prior, ensemble): (&'a Prior, &'a Ensemble),
         (value, standing): (ValueModel, StandingModel),
         history: &History,
         candidates: &[(Vec<f64>, Features)],
-        least: f64,
+        config: &SamplerConfig,
     ) -> Option<Self> {
         let origin = (ensemble.lowest.min(0.0) - ensemble.offset) / ensemble.scale;
         let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, f));
@@ -128,9 +125,9 @@ impl<'a> Acquisition<'a> {
             }
         };
         let value = value.believing(&history.pending)?;
-        let escalation = pow(ESCALATION, history.falls_in_a_row() as f64);
-        let (star, void) = (star.max(LEAST_STAR), history.void.clone());
-        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, escalation, least, void })
+        let price = config.fall_price * pow(ESCALATION, history.falls_in_a_row() as f64);
+        let (star, void, least) = (star.max(LEAST_STAR), history.void.clone(), config.least_p_stand);
+        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, price, least, void })
     }
 
     /// Predicts at a point with its terms.
@@ -159,7 +156,7 @@ impl<'a> Acquisition<'a> {
             None => (mean - self.origin).max(0.0),
             Some(incumbent) => exp(log(deviation) + log_improvement((mean - incumbent) / deviation)),
         };
-        let utility = p_stand * gain - PRICE * self.escalation * self.star * (1.0 - p_stand);
+        let utility = p_stand * gain - self.price * self.star * (1.0 - p_stand);
         let (reason, merit) = if utility > 0.0 && p_stand >= self.least {
             (Reason::Gain, utility)
         } else if 1.0 - p_stand <= SURE * (1.0 - self.least) {
