@@ -1,6 +1,6 @@
 //! The screen shows the present, or the time of what it shows.
 
-use crate::support::{Console, assert_shows, line_with, session, tick, trial};
+use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{
     ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo, StageRecord, Transition,
@@ -13,8 +13,8 @@ use quadfrog::telemetry::{
     ArmingCheck, ArmingCheckState, Counters, FallCause, Mode, Snapshot, Tick, TransitionCause, TrialInhibit,
 };
 use quadfrog::trial::{
-    Approval, Backend, DrawnRange, ExperimentStage, PointRecord, ProposalSource, SearchStatus, SearchedParameter,
-    TrialRecord, Verdict,
+    Approval, Backend, DrawnRange, ExpectedResult, ExperimentStage, FallRisk, PointRecord, Proposal, ProposalSource,
+    SearchStatus, SearchedParameter, TrialRecord, Verdict,
 };
 use quadfrog_console::message::{Msg, ReplayStatus};
 use quadfrog_console::text::as_text;
@@ -456,6 +456,24 @@ fn the_end_of_a_wait_for_the_study_takes_the_place_of_its_warning() {
     console.record(log(LogLevel::Warning, "motor FR hip 71 degrees Celsius"));
     console.record(log(LogLevel::Info, &format!("{ANSWERED_AFTER}2.0 s")));
     assert_eq!(console.said(), "motor FR hip 71 degrees Celsius", "another warning stays");
+}
+
+/// At 80x24 the advice lost its last word, `fall`, below the range of the simulated robots.
+#[test]
+fn the_advice_to_end_the_search_comes_before_the_range_of_the_simulated_robots() {
+    let mut console = Console::ready();
+    let expected = ExpectedResult {
+        value: 0.309,
+        deviation: 0.02,
+        p_stand: 0.87,
+        simulated_least: Some(0.214),
+        simulated_most: Some(0.333),
+        advises_to_stop: true,
+    };
+    let risk = Some(FallRisk { neighbours: 3, ..FallRisk::default() });
+    console.record(Record::Proposal(Proposal { expected: Some(expected), risk, ..proposal(0, 1) }));
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["no gain is worth the risk", "fall: confirm the best"]);
 }
 
 /// The result of confirming the best is part of the end of the study and of its tables.

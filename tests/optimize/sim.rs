@@ -174,7 +174,7 @@ fn proposals_stand_as_surely_as_the_key_asks() {
     assert_ne!(proposals(0.85), proposals(0.75));
 }
 
-/// P EI > 0.2 J* (1 - P) at each proposal that is worth its risk, by the model's own expectations.
+/// P EI > lambda J* (1 - P) at each proposal that is worth its risk, by the model's own expectations; fewer are at a larger price lambda.
 #[test]
 fn a_small_gain_is_not_worth_the_risk_of_a_fall() {
     let [cheap, dear] = [0.05, 0.2].map(proposals_worth_their_risk);

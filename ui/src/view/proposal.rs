@@ -147,15 +147,15 @@ fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResu
     let role = if expected.p_stand < 0.5 { Role::Warning } else { Role::Quiet };
     let mut lines =
         vec![Line::from(span(theme, role, format!(" {}", expectation(theme, &expected, &session.info.unit))))];
-    if let (Some(least), Some(most)) = (expected.simulated_least, expected.simulated_most) {
-        let text = format!(" simulated robots {} to {} {}", number(least), number(most), session.info.unit);
-        lines.push(Line::from(span(theme, Role::Quiet, text)));
-    }
     if expected.advises_to_stop {
         let text =
             " no gain is worth the risk of a fall: confirm the best, or go on with sure points, which may show more"
                 .to_owned();
         lines.push(Line::from(span(theme, Role::Warning, text)));
+    }
+    if let (Some(least), Some(most)) = (expected.simulated_least, expected.simulated_most) {
+        let text = format!(" simulated robots {} to {} {}", number(least), number(most), session.info.unit);
+        lines.push(Line::from(span(theme, Role::Quiet, text)));
     }
     lines
 }
