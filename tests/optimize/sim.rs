@@ -25,10 +25,14 @@ fn sampler(kind: SamplerKind, seed: u32) -> SamplerConfig {
     SamplerConfig { kind, seed, ..SamplerConfig::default() }
 }
 
-fn study_with(prior: &Arc<PriorModel>, seed: u32) -> Study {
-    let mut study = in_memory(options(space(), sampler(SamplerKind::Sim, seed)));
+fn study_of(prior: &Arc<PriorModel>, sampler: SamplerConfig) -> Study {
+    let mut study = in_memory(options(space(), sampler));
     study.use_prior(prior.clone());
     study
+}
+
+fn study_with(prior: &Arc<PriorModel>, seed: u32) -> Study {
+    study_of(prior, sampler(SamplerKind::Sim, seed))
 }
 
 fn right(seed: u32) -> Study {
@@ -156,8 +160,7 @@ fn values_tell_where_the_robot_stands() {
 #[test]
 fn proposals_stand_as_surely_as_the_key_asks() {
     let proposals = |least_p_stand: f64| -> Vec<Expectation> {
-        let mut study = in_memory(options(space(), SamplerConfig { least_p_stand, ..sampler(SamplerKind::Sim, 0) }));
-        study.use_prior(RIGHT.clone());
+        let mut study = study_of(&RIGHT, SamplerConfig { least_p_stand, ..sampler(SamplerKind::Sim, 0) });
         let next = |_| {
             let expected = study.draft().expected.unwrap();
             jump(&mut study, &ROBOT);
@@ -174,7 +177,8 @@ fn proposals_stand_as_surely_as_the_key_asks() {
     assert_ne!(proposals(0.85), proposals(0.75));
 }
 
-/// P EI > lambda J* (1 - P) at each proposal that is worth its risk, by the model's own expectations; fewer are at a larger price lambda.
+/// P EI > lambda J* (1 - P) at each proposal that is worth its risk, by the model's own expectations; at a larger price lambda they are
+/// fewer.
 #[test]
 fn a_small_gain_is_not_worth_the_risk_of_a_fall() {
     let [cheap, dear] = [0.05, 0.2].map(proposals_worth_their_risk);
@@ -185,8 +189,7 @@ fn a_small_gain_is_not_worth_the_risk_of_a_fall() {
 fn proposals_worth_their_risk(fall_price: f64) -> usize {
     let (mut worth, mut closest) = (0, f64::INFINITY);
     for seed in 0..8 {
-        let mut study = in_memory(options(space(), SamplerConfig { fall_price, ..sampler(SamplerKind::Sim, seed) }));
-        study.use_prior(RIGHT.clone());
+        let mut study = study_of(&RIGHT, SamplerConfig { fall_price, ..sampler(SamplerKind::Sim, seed) });
         for _ in 0..6 {
             let expected = study.draft().expected.unwrap();
             let stood = study.predict().trials.into_iter().filter(|prediction| prediction.stood);
