@@ -394,27 +394,38 @@ fn a_hang_up_without_a_signal_is_detected() {
 
 #[test]
 fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
-    let folder = folder();
-    let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
-    command.args(["--ignored", "--exact", "terminal::a_console_one_of_whose_threads_panics", "--nocapture"]);
-    let mut session = Session::run(folder.path(), (100, 30), command);
-    session.wait_for(&["REPLAY", "no robot to stop"]);
-    assert!(!session.wait().success());
-    assert!(session.restored() && session.cooked());
-    assert!(session.sent(b"an injected defect") && session.sent(b"`injected` panicked"), "{}", session.screen());
+    // While a long report of the control thread was printed, the console took the terminal back, as from a shell; of another
+    // thread it did not wait for the end of the report.
+    for (name, report_bytes) in [("injected", 0), ("injected", 2_000_000), ("control", 0), ("control", 2_000_000)] {
+        let folder = folder();
+        let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
+        command.args(["--ignored", "--exact", "terminal::a_console_one_of_whose_threads_panics", "--nocapture"]);
+        command.env("PANICKING_THREAD", name);
+        command.env("REPORT_BYTES", report_bytes.to_string());
+        let mut session = Session::run(folder.path(), (100, 30), command);
+        session.wait_for(&["REPLAY", "no robot to stop"]);
+        assert!(!session.wait().success(), "{name}, {report_bytes}");
+        assert!(session.restored() && session.cooked(), "{name}, {report_bytes}: {}", session.screen());
+        let texts = ["an injected defect".to_owned(), "end of the report".to_owned(), format!("`{name}` panicked")];
+        for text in texts {
+            assert!(session.sent(text.as_bytes()), "{name}, {report_bytes}, {text}: {}", session.screen());
+        }
+    }
 }
 
 #[test]
 #[ignore = "run by another test in a terminal"]
 fn a_console_one_of_whose_threads_panics() {
+    let variable = |name: &str| std::env::var(name).expect("set by the other test");
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/console/session.mcap");
     let player = Player::open(file).expect("the recorded session");
     let options = ConsoleOptions::new(ConsoleSettings::built_in(), None, ThemeChoice::Auto, false, false);
-    let defect = || {
+    let report = "long ".repeat(variable("REPORT_BYTES").parse::<usize>().expect("a number") / 5);
+    let defect = move || {
         std::thread::sleep(Duration::from_secs(1));
-        panic!("an injected defect");
+        panic!("an injected defect: {report}end of the report");
     };
-    std::thread::Builder::new().name("injected".into()).spawn(defect).expect("a thread");
+    std::thread::Builder::new().name(variable("PANICKING_THREAD")).spawn(defect).expect("a thread");
     let ended = app::run(Feed::replay(player), options);
     panic!("{}", ended.expect_err("the console ends with an error"));
 }

@@ -235,9 +235,8 @@ impl Console {
             }
             if let Some(thread) = terminal::panicked() {
                 self.perform_effect(Effect::Stop);
-                self.screen.hang_up();
                 self.feed.shutdown();
-                return Err(anyhow!("the thread `{thread}` panicked; the robot was stopped and the session was ended"));
+                return Err(panic_error(&thread));
             }
             self.poll_feed();
             self.draw_if_due()?;
@@ -473,11 +472,16 @@ impl Console {
             }
             std::thread::sleep(PULSE / 5);
         }
-        match closing.join() {
-            Ok(()) => Ok(ended),
-            Err(_) => Err(anyhow!("ending the session panicked")),
-        }
+        // A panic of the closing thread is among those of all threads.
+        let _ = closing.join();
+        terminal::panicked().map_or(Ok(ended), |thread| Err(panic_error(&thread)))
     }
+}
+
+/// Returns the error of a session that the panic of a thread ended, once the panic is reported.
+fn panic_error(thread: &str) -> anyhow::Error {
+    terminal::wait_for_report();
+    anyhow!("the thread `{thread}` panicked; the robot was stopped and the session was ended")
 }
 
 /// Reads the terminal in a thread, which sets the STOP latch by itself, even if the loop hangs.

@@ -3,15 +3,16 @@
 //! A thread writes the frames. A terminal that does not read (a stalled SSH connection, a paused pty) then costs frames,
 //! but delays neither keys nor STOP nor the operator heartbeat.
 
+mod panics;
 mod restore;
 mod writer;
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
 use std::rc::Rc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::channel;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -21,14 +22,13 @@ use crossterm::queue;
 use crossterm::terminal::{Clear, ClearType, EnterAlternateScreen, disable_raw_mode, enable_raw_mode, size};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::Termios;
-use quadfrog::realtime::channel::StopLatch;
 use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
 use crate::foreground;
 use crate::graphics::EncodedPicture;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS};
-use crate::output;
+pub(crate) use panics::{panicked, stop_on_panic, wait_for_report};
 use restore::{ENTERED, LEAVE_TIMEOUT, REMOVE_PICTURE, own_file, restore};
 use writer::{FrameWriter, WriteOnlyBackend, WriterState, write_frames};
 
@@ -89,19 +89,6 @@ pub fn check() -> Result<(), TerminalError> {
     }
 }
 
-/// STOP latch that a panic in any thread sets, before anything else.
-static STOP: Mutex<Option<StopLatch>> = Mutex::new(None);
-/// Name of the first thread that panicked; the loop then ends instead of leaving a dead screen.
-static PANICKED: Mutex<Option<String>> = Mutex::new(None);
-
-/// Name of the engine's control thread.
-const CONTROL: &str = "control";
-
-/// Makes a panic in any thread set this latch first; none if there is no robot to stop.
-pub(crate) fn stop_on_panic(stop: Option<StopLatch>) {
-    *STOP.lock().unwrap_or_else(PoisonError::into_inner) = stop;
-}
-
 /// The terminal in use by the console; restored on drop.
 pub(crate) struct TerminalScreen {
     terminal: Option<Terminal<WriteOnlyBackend>>,
@@ -129,7 +116,7 @@ impl TerminalScreen {
         let writer = std::thread::Builder::new()
             .name("frame-writer".into())
             .spawn(move || write_frames(&received, &for_writer, terminal))?;
-        install_panic_hook();
+        panics::install_hook();
         let writer_end =
             FrameWriter { frame: Vec::new(), synchronized: protocol.synchronized, frames, state: state.clone() };
         let backend = WriteOnlyBackend(CrosstermBackend::new(writer_end));
@@ -148,13 +135,18 @@ impl TerminalScreen {
         Ok(screen)
     }
 
-    /// Configures the terminal, also after a suspension.
+    /// Configures the terminal, also after a suspension; not after a panic, which restores it for good.
     pub fn configure(&mut self) -> io::Result<()> {
         // The library enables the raw mode only where it is not enabled, and does not see that a shell has changed it.
         disable_raw_mode()?;
         enable_raw_mode()?;
         self.mode = foreground::mode();
         ENTERED.store(true, Ordering::Release);
+        // After the terminal is marked as configured: of this thread and the one that panics, one at least sees the other.
+        if panicked().is_some() {
+            restore();
+            return Ok(());
+        }
         if let Some(terminal) = &mut self.terminal {
             let writer = &mut terminal.backend_mut().0;
             queue!(writer, EnterAlternateScreen, Hide, Clear(ClearType::All))?;
@@ -176,9 +168,11 @@ impl TerminalScreen {
         Ok(())
     }
 
-    /// Whether another program has changed the terminal's mode: keys then arrive late or not at all.
+    /// Whether another program has changed the terminal's mode: keys then arrive late or not at all. The restoration after a panic
+    /// is no change.
     pub fn mode_was_changed(&self) -> bool {
-        self.mode != foreground::mode()
+        // In this order: a panic is known before the mode is restored.
+        self.mode != foreground::mode() && panicked().is_none()
     }
 
     /// Restores the terminal for a suspension.
@@ -287,41 +281,6 @@ impl Drop for TerminalScreen {
             let _ = writer.join();
         }
     }
-}
-
-fn install_panic_hook() {
-    static INSTALLED: AtomicBool = AtomicBool::new(false);
-    if INSTALLED.swap(true, Ordering::AcqRel) {
-        return;
-    }
-    let report = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        // First: the report and the unwinding take time, during which the robot would move without control.
-        if let Some(stop) = &*STOP.lock().unwrap_or_else(PoisonError::into_inner) {
-            stop.set();
-        }
-        let thread = std::thread::current();
-        let name = thread.name().unwrap_or("unnamed").to_owned();
-        if name == CONTROL {
-            // The control thread goes on to damp the robot and must not wait for the terminal: another thread reports.
-            let report = info.to_string();
-            let print = move || {
-                restore();
-                output::message(&format!("{report}\n"));
-                PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
-            };
-            let _ = std::thread::Builder::new().name("report".into()).spawn(print);
-            return;
-        }
-        restore();
-        PANICKED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(name);
-        report(info);
-    }));
-}
-
-/// Returns the name of the first thread that panicked, if any.
-pub(crate) fn panicked() -> Option<String> {
-    PANICKED.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
 /// Watches for a hang-up of the terminal in a thread and calls `notify` once. The event loop cannot detect it: without
