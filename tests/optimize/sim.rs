@@ -231,6 +231,24 @@ fn a_mirrored_simulator_is_left_for_the_values_that_contradict_it() {
     assert!(best > 0.9 * gp, "{best} {gp}");
 }
 
+/// With the standing of mirrored robots the search stayed where they stand, and the twist lost a sixth against `gp`.
+#[test]
+fn where_a_mirrored_simulator_stands_is_left_with_its_values() {
+    let wrong = Arc::new(PriorModel::new(mirrored(prior_of(&WORLDS, 96))));
+    let mut study = study_with(&wrong, 0);
+    // The same ratio of forces; at the first point all mirrored robots fall, at the second three of four stand.
+    let (fall, stand) = ([0.5, 0.05, 0.9], [0.5, 0.0227, 0.0]);
+    let [before_fall, before_stand] = [fall, stand].map(|u| expected_at(&study, &u).p_stand);
+    for u in [[0.9, 0.3, 0.4], [0.5, 0.95, 0.95], [0.2, 0.9, 0.9], [0.5, 0.6, 0.6]] {
+        jump_at(&mut study, &u, ROBOT.jump(&u));
+    }
+    assert!(!insight(&wrong, study.trials(), Direction::Maximize).unwrap().trusted);
+    let [after_fall, after_stand] = [fall, stand].map(|u| expected_at(&study, &u).p_stand);
+    println!("where they fall {before_fall:.2} -> {after_fall:.2}, stand {before_stand:.2} -> {after_stand:.2}");
+    assert!(before_stand - before_fall > 0.3, "{before_fall} {before_stand}");
+    assert!((after_stand - after_fall).abs() < 0.1 && after_fall > 0.5, "{after_fall} {after_stand}");
+}
+
 #[test]
 fn falls_where_every_simulated_robot_stands_are_learned() {
     let mut study = right(0);

@@ -60,9 +60,9 @@ pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
 
 /// The models of value and standing. `None` if a covariance cannot be factored.
 fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
-    let value = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?.value;
-    let shares = worlds::shares(&worlds::log_likelihoods(ensemble, history));
-    Some((value, StandingModel::fit(ensemble, history, shares)?))
+    let checked = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?;
+    let shares = checked.trusted.then(|| worlds::shares(&worlds::log_likelihoods(ensemble, history)));
+    Some((checked.value, StandingModel::fit(ensemble, history, shares)?))
 }
 
 /// The proposal of the model; `None` if a covariance cannot be factored.

@@ -3,7 +3,7 @@
 //! Value: y = b + rho m + sum w_j phi_j + delta + eps, of the jumps that stood; b ~ N(0, 0.5^2), rho ~ N(1, 0.3^2),
 //! w_j ~ N(0, 2/r), delta Matern 5/2, all linear terms integrated out (Kennedy and O'Hagan, "Bayesian calibration of computer
 //! models", J. R. Statist. Soc. B 63, 2001). Standing: f = b0 + b1 sum q_k l_k + b2 z + sum gamma_j psi_j + delta_c, with a logistic
-//! likelihood; q_k is the share of world k (`worlds.rs`).
+//! likelihood; q_k is the share of world k (`worlds.rs`). Without the simulated robots f = b0 + b2 z + delta_c, b0 of mean 1.
 //! Values are in units of the prior's scale about its offset.
 
 use super::history::History;
@@ -11,6 +11,7 @@ use crate::optimize::gp::laplace::{Laplace, averaged_sigmoid};
 use crate::optimize::gp::regression::{
     HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood,
 };
+use crate::optimize::prior::standing::LogisticPrior;
 use crate::optimize::prior::terms::{Ensemble, Features};
 use libm::log;
 use nalgebra::{DMatrix, DVector};
@@ -25,6 +26,8 @@ const COMPONENTS: f64 = 2.0;
 const LABEL_COMPONENTS: f64 = 4.0;
 /// ln of the median variance of delta.
 const DELTA: f64 = -2.0;
+/// Mean of b0 without the simulated robots: a jump within the bounds stands rather than falls.
+const STANDS: f64 = 1.0;
 /// Lengthscale and variance of delta_c.
 const STANDING: (f64, f64) = (0.4, 3.0);
 /// Observations from which hyperparameters are fitted: the cost grows with their cube.
@@ -160,8 +163,8 @@ fn hyper_prior(signal: f64) -> HyperPrior {
 pub struct StandingModel {
     points: Vec<Vec<f64>>,
     terms: Vec<Vec<f64>>,
-    /// Share of each world in the label.
-    shares: Vec<f64>,
+    /// Share of each world in the label; `None` without the simulated robots.
+    shares: Option<Vec<f64>>,
     linear: LinearPrior,
     hyper: Hyperparameters,
     /// `None` before the first jump.
@@ -169,14 +172,19 @@ pub struct StandingModel {
 }
 
 impl StandingModel {
-    /// Fits all jumps; `shares` are those of the worlds. `None` if the mode is not found.
-    pub fn fit(ensemble: &Ensemble, history: &History, shares: Vec<f64>) -> Option<StandingModel> {
+    /// Fits all jumps; `shares` are those of the worlds, `None` leaves the simulated robots out. `None` if the mode is not found.
+    pub fn fit(ensemble: &Ensemble, history: &History, shares: Option<Vec<f64>>) -> Option<StandingModel> {
         let r = ensemble.components().1;
-        let prior = ensemble.standing;
-        let mut linear = LinearPrior { mean: prior.mean.to_vec(), variance: prior.deviation.map(|s| s * s).to_vec() };
-        linear.mean.extend(std::iter::repeat_n(0.0, r));
-        linear.variance.extend(std::iter::repeat_n(LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64, r));
-        let terms: Vec<Vec<f64>> = history.jumps.iter().map(|jump| shared(&jump.features, &shares)).collect();
+        let LogisticPrior { mean: [b0, b1, b2], deviation } = ensemble.standing;
+        let [v0, v1, v2] = deviation.map(|s| s * s);
+        let linear = if shares.is_some() {
+            let components = std::iter::repeat_n(LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64, r);
+            let mean = [b0, b1, b2].into_iter().chain(std::iter::repeat_n(0.0, r)).collect();
+            LinearPrior { mean, variance: [v0, v1, v2].into_iter().chain(components).collect() }
+        } else {
+            LinearPrior { mean: vec![STANDS, b2], variance: vec![v0, v2] }
+        };
+        let terms: Vec<Vec<f64>> = history.jumps.iter().map(|jump| terms(&jump.features, shares.as_deref())).collect();
         let points: Vec<Vec<f64>> = history.jumps.iter().map(|jump| jump.point.clone()).collect();
         let stood: Vec<bool> = history.jumps.iter().map(|jump| jump.stood).collect();
         let hyper =
@@ -196,7 +204,7 @@ impl StandingModel {
 
     /// The probability of standing at a point with the prior's terms there, averaged over the uncertainty.
     pub fn probability(&self, x: &[f64], features: &Features) -> f64 {
-        let terms = &shared(features, &self.shares)[..];
+        let terms = &terms(features, self.shares.as_deref())[..];
         let mean = self.linear.expected(terms);
         let variance = self.hyper.signal + self.linear.covariance(terms, terms);
         let Some(laplace) = &self.laplace else { return averaged_sigmoid(mean, variance) };
@@ -209,8 +217,10 @@ impl StandingModel {
     }
 }
 
-/// The terms of standing with the label that the worlds have together by their shares, in place of their mean label.
-fn shared(features: &Features, shares: &[f64]) -> Vec<f64> {
+/// The terms of standing with the label that the worlds have together by their shares, in place of their mean label; 1 and the reserve of
+/// friction without the worlds.
+fn terms(features: &Features, shares: Option<&[f64]>) -> Vec<f64> {
+    let Some(shares) = shares else { return vec![1.0, features.standing[2]] };
     let mut terms = features.standing.clone();
     terms[1] = features.labels.iter().zip(shares).map(|(label, share)| label * share).sum();
     terms

@@ -4,8 +4,8 @@
 //! scale. The model without them is used where its likelihood is larger by a factor of exp(3) = 20, "strong" evidence (Kass and
 //! Raftery, "Bayes factors", J. Am. Stat. Assoc. 90, 1995); the choice among priors by likelihood is that of Pautrat,
 //! Chatzilygeroudis and Mouret, "Bayesian optimization with automatic prior selection for data-efficient direct policy search", ICRA
-//! 2018 (MLEI). The choice is made anew for each proposal, so that more values can restore the prior. Standing keeps its prior,
-//! which is wide enough to be overruled by some falls.
+//! 2018 (MLEI). Standing is learned without the simulated robots where they are left: those whose values are wrong do not say where the
+//! robot stands. The choice is made anew for each proposal, so that more values can restore the prior.
 
 use super::history::History;
 use super::model::ValueModel;
