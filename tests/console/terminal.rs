@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::pty::Session;
+use clap::Parser as _;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use portable_pty::CommandBuilder;
@@ -16,6 +17,7 @@ use quadfrog::trial::{ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::app::{self, ConsoleOptions};
 use quadfrog_console::feed::Feed;
 use quadfrog_console::settings::ConsoleSettings;
+use quadfrog_console::subcommand::{self, Arguments};
 use quadfrog_console::theme::ThemeChoice;
 
 const SIZE: (u16, u16) = (100, 30);
@@ -398,8 +400,7 @@ fn a_panic_in_any_thread_restores_the_terminal_and_names_the_thread() {
     // thread it did not wait for the end of the report.
     for (name, report_bytes) in [("injected", 0), ("injected", 2_000_000), ("control", 0), ("control", 2_000_000)] {
         let folder = folder();
-        let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
-        command.args(["--ignored", "--exact", "terminal::a_console_one_of_whose_threads_panics", "--nocapture"]);
+        let mut command = ignored_test("terminal::a_console_one_of_whose_threads_panics");
         command.env("PANICKING_THREAD", name);
         command.env("REPORT_BYTES", report_bytes.to_string());
         let mut session = Session::run(folder.path(), (100, 30), command);
@@ -446,4 +447,49 @@ fn a_small_terminal_and_none_are_refused_with_status_2() {
     let printed = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(printed.contains("needs a terminal"), "{printed}");
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "no file is left");
+}
+
+/// It was status 0.
+#[test]
+fn a_panic_while_the_session_ends_is_an_error() {
+    let folder = folder();
+    let mut command = ignored_test("terminal::a_session_with_a_thread_that_panics_at_its_end");
+    command.env("OUTPUT", folder.path());
+    let mut session = Session::run(folder.path(), SIZE, command);
+    session.wait_for(&["Press A to arm"]);
+    session.send("q");
+    assert!(!session.wait().success(), "{}", session.screen());
+    assert!(session.restored() && session.cooked(), "{}", session.screen());
+    assert!(session.sent(b"an injected defect") && session.sent(b"`injected` panicked"), "{}", session.screen());
+    assert_eq!(player(folder.path()).damage(), None);
+}
+
+#[test]
+#[ignore = "run by another test in a terminal"]
+fn a_session_with_a_thread_that_panics_at_its_end() {
+    // The thread `close` runs while the session ends.
+    let ends = || {
+        let threads = std::fs::read_dir("/proc/self/task").expect("the threads of this process").flatten();
+        let mut names = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("comm")).ok());
+        names.any(|name| name.trim() == "close")
+    };
+    let defect = move || {
+        while !ends() {
+            std::thread::yield_now();
+        }
+        panic!("an injected defect");
+    };
+    std::thread::Builder::new().name("injected".into()).spawn(defect).expect("a thread");
+    let output = std::env::var("OUTPUT").expect("set by the other test");
+    if let Err(failure) = subcommand::run(Arguments::parse_from(["quadfrog", "--output", &output])) {
+        failure.print();
+        std::process::exit(1);
+    }
+}
+
+/// This program as one ignored test.
+fn ignored_test(name: &str) -> CommandBuilder {
+    let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
+    command.args(["--ignored", "--exact", name, "--nocapture"]);
+    command
 }

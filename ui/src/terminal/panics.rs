@@ -36,8 +36,8 @@ pub fn panicked() -> Option<String> {
     first_panic().as_ref().map(|panic| panic.thread.clone())
 }
 
-/// Waits until the terminal is restored and the first panic reported on it, or until a terminal that does not read cost the time
-/// limit. A program that ends before takes the report with it.
+/// Waits until the terminal is restored and the first panic reported on it, at most [`REPORT_TIMEOUT`]: the terminal may not read. A
+/// program that ends earlier cuts the report off.
 pub fn wait_for_report() {
     let waits = |panic: &mut Option<Panic>| panic.as_ref().is_some_and(|panic| !panic.reported);
     // Either way the program ends now.
