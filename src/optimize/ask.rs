@@ -92,7 +92,7 @@ impl Default for SamplerConfig {
             seed: 0,
             startup_trials: None,
             candidates: 24,
-            least_p_stand: 0.75,
+            least_p_stand: 0.85,
             fall_price: 0.2,
         }
     }

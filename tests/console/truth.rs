@@ -476,19 +476,6 @@ fn the_advice_to_end_the_search_comes_before_the_range_of_the_simulated_robots()
     assert_shows(&screen, &["no gain is worth the risk", "fall: confirm the best"]);
 }
 
-/// The advice called the repetition of a jump a sure point.
-#[test]
-fn the_advice_to_end_the_search_names_the_jump_that_is_repeated() {
-    let mut console = Console::ready();
-    let expected = ExpectedResult { value: 0.309, p_stand: 0.8, advises_to_stop: true, ..ExpectedResult::default() };
-    console.record(Record::Proposal(Proposal { expected: Some(expected), ..proposal(3, 1) }));
-    assert_shows(&console.screen(120, 40), &["points, which may show more"]);
-    // The same point.
-    console.record(Record::Trial(trial(1, Some(Verdict::Accept), None)));
-    console.record(Record::Proposal(Proposal { expected: Some(expected), ..proposal(3, 1) }));
-    assert_shows(&console.screen(120, 40), &["repeat #1"]);
-}
-
 /// The result of confirming the best is part of the end of the study and of its tables.
 #[test]
 fn the_end_of_a_confirmed_study_names_the_result() {

@@ -3,10 +3,13 @@
 
 use crate::simulated;
 use crate::support;
+use nalgebra::{DMatrix, DVector};
 use quadfrog::optimize::ask::{Direction, Expectation, SamplerConfig, SamplerKind};
+use quadfrog::optimize::gp::laplace::{Laplace, sigmoid};
 use quadfrog::optimize::prior::terms::Features;
 use quadfrog::optimize::prior::{Prior, PriorModel, World};
 use quadfrog::optimize::sim::insight::insight;
+use quadfrog::optimize::sim::propagation::Propagation;
 use quadfrog::optimize::space::{Parameter, Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyOptions, TrialDraft};
 use serde::Deserialize;
@@ -120,6 +123,68 @@ fn predictions_equal_dense_linear_algebra() {
     assert!(largest < 1e-5, "{largest}");
 }
 
+/// Regression: with Laplace's approximation a jump that had stood was given P = 0.80 where it stands in 98 of 100 repetitions, and the
+/// search returned to low jumps. One to three signs of equal latent values, so that the posterior is an integral over one of them.
+#[test]
+fn probabilities_equal_the_integral_over_the_latent_value() {
+    let (mut difference, mut of_laplace) = (0.0_f64, 0.0_f64);
+    for (mean, variance) in [(1.7_f64, 7.0_f64), (0.0, 30.0), (-2.0, 10.0), (6.0, 100.0)] {
+        for signs in [&[true][..], &[false], &[true, true], &[true, false], &[false, false, true]] {
+            let n = signs.len();
+            let (k, means) = (DMatrix::from_element(n, n, variance), DVector::from_element(n, mean));
+            // Midpoints over twelve standard deviations.
+            let steps = 20_000;
+            let latent = |i: i32| mean + variance.sqrt() * 12.0 * ((f64::from(i) + 0.5) / f64::from(steps) - 0.5);
+            let density = |f: f64| {
+                let likelihood: f64 =
+                    signs.iter().map(|stood| if *stood { sigmoid(f) } else { 1.0 - sigmoid(f) }).product();
+                likelihood * (-0.5 * (f - mean) * (f - mean) / variance).exp()
+            };
+            let sum = |g: &dyn Fn(f64) -> f64| (0..steps).map(latent).map(|f| g(f) * density(f)).sum::<f64>();
+            let exact = sum(&sigmoid) / sum(&|_| 1.0);
+            let covariances = DVector::from_element(n, variance);
+            let propagated = Propagation::fit(&k, &means, signs).unwrap().probability(mean, &covariances, variance);
+            let laplace = Laplace::fit(&k, &means, signs).unwrap().probability(mean, &covariances, variance);
+            println!("{mean} {variance} {signs:?}: {exact:.3}, propagated {propagated:.3}, Laplace {laplace:.3}");
+            difference = difference.max((propagated - exact).abs());
+            of_laplace = of_laplace.max((laplace - exact).abs());
+        }
+    }
+    println!("largest difference {difference:.3}, of Laplace's approximation {of_laplace:.3}");
+    assert!(difference < 0.04 && of_laplace > 0.2, "{difference} {of_laplace}");
+}
+
+/// A hundred signs, many of them at one point, and contradictory ones.
+#[test]
+fn many_equal_and_contradictory_signs_converge() {
+    let mut random = quadfrog::optimize::mt19937::Mt19937::new(1);
+    for (points, variance) in [(1, 3.0_f64), (1, 300.0), (4, 30.0), (100, 3000.0)] {
+        let places: Vec<f64> = (0..100).map(|_| (random.double() * f64::from(points)).floor()).collect();
+        let near = |i: usize, j: usize| (-0.1 * (places[i] - places[j]).abs()).exp();
+        let k = DMatrix::from_fn(100, 100, |i, j| variance * near(i, j));
+        for share in [0.0, 0.5, 1.0] {
+            let signs: Vec<bool> = (0..100).map(|_| random.double() < share).collect();
+            let fitted = Propagation::fit(&k, &DVector::from_element(100, 1.0), &signs);
+            let p = fitted.unwrap().probability(1.0, &k.column(0).into_owned(), variance);
+            println!("{points} points, variance {variance}, share {share}: P = {p:.3}");
+            assert!((0.0..=1.0).contains(&p) && (share == 0.5 || (p - share).abs() < 0.2), "{p}");
+        }
+    }
+}
+
+/// Regression: with independent coefficients of 1 and of the label the first twist was expected to stand with P = 0.66 where all worlds
+/// stood, and 1.5 rad were jumped in place of 2.5 rad.
+#[test]
+fn where_all_worlds_stand_the_first_jump_is_expected_to_stand() {
+    // The feet hold but in a corner.
+    let sticky = WORLDS.map(|world| Formula { grip: world.grip + 0.35, ..world });
+    let prior = Arc::new(PriorModel::new(prior_of(&sticky, 96)));
+    let expected = expected_at(&study_with(&prior, 0), &[0.55, 0.7, 0.6]);
+    let first = study_with(&prior, 0).draft().expected.unwrap();
+    println!("P = {:.3} in the middle, {:.3} at the first proposal", expected.p_stand, first.p_stand);
+    assert!(expected.p_stand > 0.88 && first.p_stand > 0.88, "{expected:?} {first:?}");
+}
+
 #[test]
 fn a_right_simulator_finds_the_best_jump_within_five() {
     let (mut best, mut falls, mut gp) = (0.0, 0, 0.0);
@@ -173,7 +238,7 @@ fn proposals_stand_as_surely_as_the_key_asks() {
         println!("asked {least}: {:.3?}", worth.iter().map(|e| e.p_stand).collect::<Vec<_>>());
         assert!(!worth.is_empty() && worth.iter().all(|e| e.p_stand >= least), "{worth:?}, asked {least}");
     }
-    assert_eq!(SamplerConfig::default().least_p_stand, 0.75);
+    assert_eq!(SamplerConfig::default().least_p_stand, 0.85);
     assert_ne!(proposals(0.85), proposals(0.75));
 }
 
@@ -407,66 +472,26 @@ fn without_worthwhile_gain_the_highest_of_the_sure_points_is_jumped() {
     assert!(lowest_share > 0.8, "{lowest_share}");
 }
 
-/// Regression: where no gain was worth its risk, sure points of 1.8 rad were jumped after a twist of 2.7 rad that the model gave 0.83, so
-/// that nothing was learned about it.
-#[test]
-fn a_high_jump_that_stood_is_repeated_before_a_lower_sure_point() {
-    let mut repeated = 0;
-    for seed in 0..12 {
-        let mut study = right(seed);
-        for _ in 0..12 {
-            let draft = study.draft();
-            let expected = draft.expected.unwrap();
-            let asked = study.options().sampler.least_p_stand;
-            let stood = study.trials().iter().filter(|trial| !trial.is_fall());
-            let known = stood.map(|trial| study.expect(&trial.parameters).unwrap());
-            // Those that are not sure; the search finds the surroundings of sure ones by itself.
-            let repeatable = known.filter(|known| (asked..0.85).contains(&known.p_stand));
-            let hope = |expected: &Expectation| expected.value + expected.deviation;
-            let highest = repeatable.map(|known| hope(&known)).fold(f64::NEG_INFINITY, f64::max);
-            if !expected.worth_the_risk {
-                assert!(hope(&expected) >= highest - 1e-9, "seed {seed}: {expected:?} and a repetition {highest}");
-            }
-            let point: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
-            repeated += usize::from(points(&study).contains(&point));
-            jump(&mut study, &ROBOT);
-        }
-    }
-    assert!(repeated > 0, "equal to the bit");
-}
-
-#[test]
-fn a_repetition_that_runs_or_is_void_is_not_proposed_again() {
-    let point_of = |draft: &TrialDraft| draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect::<Vec<_>>();
-    for void in [false, true] {
-        let mut study = right(0);
-        while !points(&study).contains(&point_of(&study.draft())) {
-            assert!(study.trials().len() < 12, "no repetition");
-            jump(&mut study, &ROBOT);
-        }
-        let repetition = study.draft();
-        let number = study.begin(&repetition, &[], &[]).unwrap();
-        if void {
-            study.tell(number, Outcome::Fail).unwrap();
-        }
-        assert_ne!(point_of(&study.draft()), point_of(&repetition), "void: {void}");
-    }
-}
-
 /// Regression: where no gain is worth its risk, a void trial closed a third of the range about the best point for the rest of a study.
+/// The later jumps lose little by it.
 #[test]
 fn a_void_trial_does_not_drive_the_search_from_the_best_region() {
+    let mean_of_six_after = |seed, before, is_void: bool| {
+        let mut study = right(seed);
+        jumps(&mut study, before, &ROBOT);
+        if is_void {
+            let void = study.begin(&study.draft(), &[], &[]).unwrap();
+            study.tell(void, Outcome::Fail).unwrap();
+        }
+        let after: Vec<f64> = (0..6).filter_map(|_| jump(&mut study, &ROBOT)).collect();
+        after.iter().sum::<f64>() / after.len() as f64
+    };
     let mut share = f64::INFINITY;
     for seed in 0..5 {
         for before in [6, 9] {
-            let mut study = right(seed);
-            let best = (0..before).filter_map(|_| jump(&mut study, &ROBOT)).fold(0.0, f64::max);
-            let void = study.begin(&study.draft(), &[], &[]).unwrap();
-            study.tell(void, Outcome::Fail).unwrap();
-            let after: Vec<f64> = (0..6).filter_map(|_| jump(&mut study, &ROBOT)).collect();
-            let mean = after.iter().sum::<f64>() / after.len() as f64;
-            println!("seed {seed}, void {before}: best {best:.3}, mean of the six later ones {mean:.3}");
-            share = share.min(mean / best);
+            let [without, with] = [false, true].map(|is_void| mean_of_six_after(seed, before, is_void));
+            println!("seed {seed}: mean of the six jumps after {before} {without:.3}, after a void one {with:.3}");
+            share = share.min(with / without);
         }
     }
     assert!(share > 0.95, "{share}");

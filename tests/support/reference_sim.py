@@ -5,11 +5,12 @@
     python3 tests/support/reference_sim.py tests/golden/sim_prior.json
 
 Written from the equations of src/optimize/README.md, "Simulated robots as the prior", not from the Rust sources: inverse matrices
-in place of factors, a pattern search in place of a gradient ascent, Newton's method on the latent values themselves in place of
-Rasmussen and Williams' algorithm 3.1. Points, worlds and trials are made here; the hyperparameters of the surfaces are given.
+in place of factors, a pattern search in place of a gradient ascent, expectation propagation with all factors changed at once, by
+half, and their moments by quadrature, in place of one after the other in closed form. Points, worlds and trials are made here; the hyperparameters of the surfaces are given.
 """
 
 import json
+import math
 import sys
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 NAMES, LOW, HIGH = ["Fx", "Fz"], np.array([0.0, 150.0]), np.array([150.0, 350.0])
 VALUE_THETA = np.log([0.8, 1.1, 1.3, 0.01])
 LABEL_THETA = np.log([0.6, 0.9, 1.0, 0.05])
+WIDTH = 1.702
 
 
 def matern(a, b, lengthscale):
@@ -82,6 +84,30 @@ def maximize(f, start, bounds):
     return x, best
 
 
+def cdf(z):
+    return 0.5 * math.erfc(-z / math.sqrt(2))
+
+
+def propagate(k, mean, signs):
+    """Precisions and means of the normal factors that stand for Phi(sign f / WIDTH)."""
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    tau, nu = np.zeros(len(mean)), np.zeros(len(mean))
+    for _ in range(200):
+        posterior = np.linalg.inv(np.linalg.inv(k) + np.diag(tau))
+        centre = posterior @ (np.linalg.solve(k, mean) + nu)
+        without = 1 / posterior.diagonal() - tau
+        around = (centre / posterior.diagonal() - nu) / without
+        for i, sign in enumerate(signs):
+            f = around[i] + 12 / np.sqrt(without[i]) * nodes
+            density = weights * np.exp(-0.5 * without[i] * (f - around[i]) ** 2) * [cdf(sign * v / WIDTH) for v in f]
+            density /= density.sum()
+            first = density @ f
+            second = density @ (f - first) ** 2
+            tau[i] += 0.5 * (1 / second - without[i] - tau[i])
+            nu[i] += 0.5 * (first / second - without[i] * around[i] - nu[i])
+    return tau, nu / tau
+
+
 class Ensemble:
     def __init__(self, points, worlds):
         self.values, self.labels = [], []
@@ -102,7 +128,7 @@ class Ensemble:
             rows = np.stack([np.ones(len(z)), np.delete(g, k, 0).mean(0), reserve(z)], 1)
             fits.append(logistic(rows, np.where(g[k] > 0, 0.98, 0.02)))
         fits = np.array(fits)
-        self.mean, self.sd = fits.mean(0), np.maximum(1.5 * fits.std(0, ddof=1), [1.5, 0.7, 0.5])
+        self.mean, self.covariance = fits.mean(0), 2.25 * np.cov(fits.T) + np.diag(np.square([1.5, 0.7, 0.5]))
 
     def raw(self, x):
         return np.array([f(x) for f in self.values]), np.array([f(x) for f in self.labels])
@@ -159,23 +185,17 @@ def predict(ensemble, trials, x):
     k = np.exp(theta[2]) * matern(x, xs, np.exp(theta[:2])) + (hx * variance) @ hs.T
     value = hx @ mean + k @ inverse @ (y - hs @ mean)
     spread = np.exp(theta[2]) + (hx * hx * variance).sum(1) - (k @ inverse * k).sum(1)
-    # standing: f <- (K^-1 + W)^-1 (W f + t - p + K^-1 m)
+    # standing
     r = ensemble.b.shape[1]
-    mean, variance = np.r_[ensemble.mean, [0] * r], np.r_[ensemble.sd**2, [8.0 / r] * r]
-    kernel = lambda a, ha, b, hb: 3.0 * matern(a, b, np.full(2, 0.4)) + (ha * variance) @ hb.T
-    inverse, m = np.linalg.inv(kernel(point, c, point, c)), c @ mean
-    f = m.copy()
-    for _ in range(500):
-        p = 1 / (1 + np.exp(-f))
-        w = p * (1 - p)
-        f = f + 0.5 * (np.linalg.solve(inverse + np.diag(w), w * f + stood - p + inverse @ m) - f)
-    p = 1 / (1 + np.exp(-f))
+    mean, spreads = np.r_[ensemble.mean, [0] * r], np.diag([8.0 / r] * (3 + r))
+    spreads[:3, :3] = ensemble.covariance
+    kernel = lambda a, ha, b, hb: 3.0 * matern(a, b, np.full(2, 0.4)) + ha @ spreads @ hb.T
+    m, centre = propagate(kernel(point, c, point, c), c @ mean, np.where(stood, 1.0, -1.0))
     k = kernel(x, cx, point, c)
-    latent = cx @ mean + k @ (stood - p)
-    prior = 3.0 + (cx * cx * variance).sum(1)
-    covariance = kernel(point, c, point, c) + np.diag(1 / (p * (1 - p)))
-    uncertainty = prior - (k @ np.linalg.inv(covariance) * k).sum(1)
-    chance = 1 / (1 + np.exp(-latent / np.sqrt(1 + np.pi * uncertainty / 8)))
+    inverse = np.linalg.inv(kernel(point, c, point, c) + np.diag(1 / m))
+    latent = cx @ mean + k @ inverse @ (centre - c @ mean)
+    uncertainty = kernel(x, cx, x, cx).diagonal() - (k @ inverse * k).sum(1)
+    chance = np.array([cdf(q) for q in latent / np.sqrt(WIDTH**2 + uncertainty)])
     worlds = ensemble.raw(x)[0]
     return [
         dict(unit=list(u), value=float(v), deviation=float(s), p_stand=float(q), worlds=[float(lo), float(hi)])

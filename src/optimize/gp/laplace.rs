@@ -78,7 +78,7 @@ impl Laplace {
 }
 
 /// The sigmoid averaged over a normal distribution: MacKay's approximation (Neural Computation 4, 1992).
-pub fn averaged_sigmoid(mean: f64, variance: f64) -> f64 {
+fn averaged_sigmoid(mean: f64, variance: f64) -> f64 {
     sigmoid(mean / sqrt(1.0 + PI * variance / 8.0))
 }
 

@@ -1,27 +1,27 @@
 //! The prior of a robot's standing: how well the labels of the other worlds and the reserve of friction predict those of a world.
 //!
 //! Each world is predicted from the others, as the robot will be from all, by logistic regression on (1, mean label of the others, z)
-//! with a normal prior N(0, 3^2) of the coefficients. Their mean and spread over the worlds is the robot's prior (empirical Bayes).
+//! with a normal prior N(0, 3^2) of the coefficients. Their mean and covariance over the worlds are the robot's prior (empirical Bayes).
+//! The covariance matters: where all worlds stand nearly everywhere only the sum of the coefficients of 1 and of the label is known.
 
 use crate::optimize::gp::laplace::sigmoid;
-use libm::sqrt;
 use nalgebra::{Matrix3, Vector3};
 
-/// Mean and standard deviation of the coefficients of 1, g and z.
+/// Mean and covariance of the coefficients of 1, g and z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogisticPrior {
     /// Means.
-    pub mean: [f64; 3],
-    /// Standard deviations.
-    pub deviation: [f64; 3],
+    pub mean: Vector3<f64>,
+    /// Covariance.
+    pub covariance: Matrix3<f64>,
 }
 
-/// Least standard deviations: a handful of worlds does not span all robots.
-const LEAST_DEVIATION: [f64; 3] = [1.5, 0.7, 0.5];
+/// Standard deviations beside the spread over the worlds, of which a handful does not span all robots.
+const OWN_DEVIATION: [f64; 3] = [1.5, 0.7, 0.5];
 /// Factor of the spread over the worlds.
 const SPREAD: f64 = 1.5;
-/// Prior of a single world, from which nothing can be left out.
-const SINGLE: LogisticPrior = LogisticPrior { mean: [0.5, 2.0, 0.0], deviation: [2.5, 0.7, 0.7] };
+/// Means and standard deviations for a single world, from which nothing can be left out.
+const SINGLE: ([f64; 3], [f64; 3]) = ([0.5, 2.0, 0.0], [2.5, 0.7, 0.7]);
 /// Probabilities of standing that stand for a label, so that the odds stay finite.
 const TARGET: (f64, f64) = (0.02, 0.98);
 /// Variance of the coefficients' own prior.
@@ -31,7 +31,8 @@ const RIDGE: f64 = 9.0;
 pub fn leave_one_world_out(labels: &[Vec<f64>], reserve: &[f64]) -> LogisticPrior {
     let worlds = labels.first().map_or(0, Vec::len);
     if worlds < 2 {
-        return SINGLE;
+        let (mean, deviation) = SINGLE;
+        return LogisticPrior { mean: mean.into(), covariance: squared(deviation) };
     }
     let coefficients: Vec<Vector3<f64>> = (0..worlds)
         .map(|k| {
@@ -45,10 +46,14 @@ pub fn leave_one_world_out(labels: &[Vec<f64>], reserve: &[f64]) -> LogisticPrio
         .collect();
     let n = worlds as f64;
     let mean = coefficients.iter().sum::<Vector3<f64>>() / n;
-    let square = |c: &Vector3<f64>| (c - mean).component_mul(&(c - mean));
-    let variance = coefficients.iter().map(square).sum::<Vector3<f64>>() / (n - 1.0);
-    let deviation = |i: usize| (SPREAD * sqrt(variance[i])).max(LEAST_DEVIATION[i]);
-    LogisticPrior { mean: mean.into(), deviation: [deviation(0), deviation(1), deviation(2)] }
+    let product = |c: &Vector3<f64>| (c - mean) * (c - mean).transpose();
+    let sum = coefficients.iter().map(product).sum::<Matrix3<f64>>();
+    LogisticPrior { mean, covariance: sum * (SPREAD * SPREAD / (n - 1.0)) + squared(OWN_DEVIATION) }
+}
+
+/// Covariance of independent coefficients with these standard deviations.
+fn squared(deviation: [f64; 3]) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::from(deviation).map(|s| s * s))
 }
 
 /// Coefficients of largest posterior, by Newton's method with halved steps.

@@ -18,8 +18,6 @@ pub struct Jump {
     pub stood: bool,
     /// Objective, larger is better; without meaning for a fall.
     pub value: f64,
-    /// Whether it may be repeated: no later trial of its point is running or void.
-    pub repeatable: bool,
 }
 
 /// The trials that the model reads.
@@ -45,19 +43,15 @@ impl History {
             let Some(point) = coordinates.collect::<Option<Vec<f64>>>() else { continue };
             match (trial.state, trial.value) {
                 (TrialState::Running, _) => {
-                    history.repeat_no_more(&point);
                     let features = ensemble.features(prior.prior(), &point);
                     history.pending.push((point, features));
                 }
-                (TrialState::Fail, _) => {
-                    history.repeat_no_more(&point);
-                    history.void.push(point);
-                }
+                (TrialState::Fail, _) => history.void.push(point),
                 (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
                     let features = ensemble.features(prior.prior(), &point);
                     let value = direction.maximized(value);
                     let stood = !trial.is_fall();
-                    history.jumps.push(Jump { number: trial.number, point, features, stood, value, repeatable: true });
+                    history.jumps.push(Jump { number: trial.number, point, features, stood, value });
                 }
                 _ => {}
             }
@@ -69,10 +63,6 @@ impl History {
         };
         history.void.retain(|point| !again(point));
         history
-    }
-
-    fn repeat_no_more(&mut self, point: &[f64]) {
-        self.jumps.iter_mut().filter(|jump| jump.point == point).for_each(|jump| jump.repeatable = false);
     }
 
     /// The jumps without a fall.

@@ -7,6 +7,7 @@
 pub mod history;
 pub mod insight;
 pub mod model;
+pub mod propagation;
 pub mod safeguard;
 pub mod search;
 pub mod worlds;
@@ -73,21 +74,18 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
     let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
-    let (unit, worth_the_risk, repeated) = if all_given {
-        (search.bounds.iter().map(|(low, _)| *low).collect(), true, None)
+    let (unit, worth_the_risk) = if all_given {
+        (search.bounds.iter().map(|(low, _)| *low).collect(), true)
     } else {
         let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
         let worth = best.is_worth_the_risk();
-        (best.point, worth, best.repeated)
+        (best.point, worth)
     };
-    // A repetition has the values of its trial to the bit, which the coordinates do not keep.
-    let repeated = repeated.and_then(|number| ask.trials.get(number as usize));
     let features = ensemble.features(prior.prior(), &unit);
     let prediction = acquisition.predict(&unit, &features);
     let value = |p: &super::space::Parameter| {
         let at = prior.prior().parameters.iter().position(|known| known.name == p.name)?;
-        let proposed = repeated.and_then(|trial| trial.parameter(&p.name));
-        let proposed = proposed.unwrap_or(prior.prior().parameters[at].range.extrapolate(unit[at]));
+        let proposed = prior.prior().parameters[at].range.extrapolate(unit[at]);
         Some(ask.given(p).unwrap_or(proposed.clamp(p.range.low, p.range.high)))
     };
     let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;

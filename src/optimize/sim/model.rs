@@ -3,11 +3,11 @@
 //! Value: y = b + rho m + sum w_j phi_j + delta + eps, of the jumps that stood; b ~ N(0, 0.5^2), rho ~ N(1, 0.3^2),
 //! w_j ~ N(0, 2/r), delta Matern 5/2, all linear terms integrated out (Kennedy and O'Hagan, "Bayesian calibration of computer
 //! models", J. R. Statist. Soc. B 63, 2001). Standing: f = b0 + b1 sum q_k l_k + b2 z + sum gamma_j psi_j + delta_c, with a logistic
-//! likelihood; q_k is the share of world k (`worlds.rs`). Without the simulated robots f = b0 + b2 z + delta_c, b0 of mean 1.
-//! Values are in units of the prior's scale about its offset.
+//! likelihood (`propagation.rs`); q_k is the share of world k (`worlds.rs`). Without the simulated robots f = b0 + b2 z + delta_c, b0 of
+//! mean 1. Values are in units of the prior's scale about its offset.
 
 use super::history::History;
-use crate::optimize::gp::laplace::{Laplace, averaged_sigmoid};
+use super::propagation::{Propagation, averaged};
 use crate::optimize::gp::regression::{
     HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood,
 };
@@ -158,70 +158,95 @@ fn hyper_prior(signal: f64) -> HyperPrior {
     }
 }
 
+/// Prior of the coefficients of the standing's terms: normal, with correlations.
+#[derive(Debug, Clone)]
+struct StandingPrior {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl StandingPrior {
+    /// That of the worlds with the components of their labels; without them that of 1 and z alone.
+    fn of(ensemble: &Ensemble, with_worlds: bool) -> StandingPrior {
+        let LogisticPrior { mean, covariance } = ensemble.standing;
+        if !with_worlds {
+            let variance = DVector::from_vec(vec![covariance[(0, 0)], covariance[(2, 2)]]);
+            return StandingPrior {
+                mean: DVector::from_vec(vec![STANDS, mean[2]]),
+                covariance: DMatrix::from_diagonal(&variance),
+            };
+        }
+        let r = ensemble.components().1;
+        let component = LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64;
+        let mut all = StandingPrior {
+            mean: DVector::zeros(3 + r),
+            covariance: DMatrix::from_diagonal_element(3 + r, 3 + r, component),
+        };
+        all.mean.rows_mut(0, 3).copy_from(&mean);
+        all.covariance.view_mut((0, 0), (3, 3)).copy_from(&covariance);
+        all
+    }
+}
+
 /// The robot's probability of standing at a point.
 #[derive(Debug, Clone)]
 pub struct StandingModel {
     points: Vec<Vec<f64>>,
-    terms: Vec<Vec<f64>>,
+    terms: Vec<DVector<f64>>,
     /// Share of each world in the label; `None` without the simulated robots.
     shares: Option<Vec<f64>>,
-    linear: LinearPrior,
+    prior: StandingPrior,
+    /// Of delta_c.
     hyper: Hyperparameters,
     /// `None` before the first jump.
-    laplace: Option<Laplace>,
+    posterior: Option<Propagation>,
 }
 
 impl StandingModel {
-    /// Fits all jumps; `shares` are those of the worlds, `None` leaves the simulated robots out. `None` if the mode is not found.
+    /// Fits all jumps; `shares` are those of the worlds, `None` leaves the simulated robots out. `None` if the approximation does not
+    /// converge.
     pub fn fit(ensemble: &Ensemble, history: &History, shares: Option<Vec<f64>>) -> Option<StandingModel> {
-        let r = ensemble.components().1;
-        let LogisticPrior { mean: [b0, b1, b2], deviation } = ensemble.standing;
-        let [v0, v1, v2] = deviation.map(|s| s * s);
-        let linear = if shares.is_some() {
-            let components = std::iter::repeat_n(LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64, r);
-            let mean = [b0, b1, b2].into_iter().chain(std::iter::repeat_n(0.0, r)).collect();
-            LinearPrior { mean, variance: [v0, v1, v2].into_iter().chain(components).collect() }
-        } else {
-            LinearPrior { mean: vec![STANDS, b2], variance: vec![v0, v2] }
-        };
-        let terms: Vec<Vec<f64>> = history.jumps.iter().map(|jump| terms(&jump.features, shares.as_deref())).collect();
+        let prior = StandingPrior::of(ensemble, shares.is_some());
         let points: Vec<Vec<f64>> = history.jumps.iter().map(|jump| jump.point.clone()).collect();
+        let terms: Vec<_> = history.jumps.iter().map(|jump| terms(&jump.features, shares.as_deref())).collect();
         let stood: Vec<bool> = history.jumps.iter().map(|jump| jump.stood).collect();
         let hyper =
             Hyperparameters { lengthscale: vec![STANDING.0; history.dimensions], signal: STANDING.1, noise: 0.0 };
-        let n = points.len();
-        let laplace = if n == 0 {
-            None
-        } else {
-            let covariance =
-                |i: usize, j: usize| hyper.kernel(&points[i], &points[j]) + linear.covariance(&terms[i], &terms[j]);
-            let k = DMatrix::from_fn(n, n, covariance);
-            let mean = DVector::from_iterator(n, terms.iter().map(|h: &Vec<f64>| linear.expected(h)));
-            Some(Laplace::fit(&k, &mean, &stood)?)
-        };
-        Some(StandingModel { points, terms, shares, linear, hyper, laplace })
+        let mut model = StandingModel { points, terms, shares, prior, hyper, posterior: None };
+        let n = stood.len();
+        if n > 0 {
+            let rows = model.points.iter().zip(&model.terms).map(|(x, terms)| model.covariances(x, terms).transpose());
+            let k = DMatrix::from_rows(&rows.collect::<Vec<_>>());
+            let mean = DVector::from_iterator(n, model.terms.iter().map(|h| h.dot(&model.prior.mean)));
+            model.posterior = Some(Propagation::fit(&k, &mean, &stood)?);
+        }
+        Some(model)
+    }
+
+    /// Covariances of the latent value at a point with those at the jumps.
+    fn covariances(&self, x: &[f64], terms: &DVector<f64>) -> DVector<f64> {
+        let weighted = &self.prior.covariance * terms;
+        let covariance = |(p, h): (&Vec<f64>, &DVector<f64>)| self.hyper.kernel(x, p) + weighted.dot(h);
+        DVector::from_iterator(self.points.len(), self.points.iter().zip(&self.terms).map(covariance))
     }
 
     /// The probability of standing at a point with the prior's terms there, averaged over the uncertainty.
     pub fn probability(&self, x: &[f64], features: &Features) -> f64 {
-        let terms = &terms(features, self.shares.as_deref())[..];
-        let mean = self.linear.expected(terms);
-        let variance = self.hyper.signal + self.linear.covariance(terms, terms);
-        let Some(laplace) = &self.laplace else { return averaged_sigmoid(mean, variance) };
-        let covariance = self
-            .points
-            .iter()
-            .zip(&self.terms)
-            .map(|(p, h)| self.hyper.kernel(p, x) + self.linear.covariance(h, terms));
-        laplace.probability(mean, &DVector::from_iterator(self.points.len(), covariance), variance)
+        let terms = terms(features, self.shares.as_deref());
+        let mean = terms.dot(&self.prior.mean);
+        let variance = self.hyper.signal + terms.dot(&(&self.prior.covariance * &terms));
+        match &self.posterior {
+            Some(posterior) => posterior.probability(mean, &self.covariances(x, &terms), variance),
+            None => averaged(mean, variance),
+        }
     }
 }
 
 /// The terms of standing with the label that the worlds have together by their shares, in place of their mean label; 1 and the reserve of
 /// friction without the worlds.
-fn terms(features: &Features, shares: Option<&[f64]>) -> Vec<f64> {
-    let Some(shares) = shares else { return vec![1.0, features.standing[2]] };
-    let mut terms = features.standing.clone();
+fn terms(features: &Features, shares: Option<&[f64]>) -> DVector<f64> {
+    let Some(shares) = shares else { return DVector::from_vec(vec![1.0, features.standing[2]]) };
+    let mut terms = DVector::from_column_slice(&features.standing);
     terms[1] = features.labels.iter().zip(shares).map(|(label, share)| label * share).sum();
     terms
 }

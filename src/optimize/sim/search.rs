@@ -1,6 +1,6 @@
 //! The gain of a jump less the price of its falls, and the search for the point where it is largest.
 
-use super::history::{History, Jump};
+use super::history::History;
 use super::model::{StandingModel, ValueModel};
 use crate::optimize::ask::{SamplerConfig, Streams};
 use crate::optimize::gp::{VOID_RADIUS, log_improvement};
@@ -57,9 +57,8 @@ pub struct Acquisition<'a> {
     price: f64,
     /// Probability of standing below which no gain is worth a jump.
     least: f64,
-    void: Vec<Vec<f64>>,
-    /// The jumps that may be repeated.
-    repeatable: Vec<Jump>,
+    /// Points of void and of running trials.
+    avoided: Vec<Vec<f64>>,
 }
 
 /// Reason to choose a point, the weakest first.
@@ -94,8 +93,6 @@ pub struct Scored {
     score: Score,
     /// PointPrediction there.
     pub prediction: PointPrediction,
-    /// The trial that it repeats.
-    pub repeated: Option<u32>,
 }
 
 impl Scored {
@@ -116,11 +113,10 @@ impl<'a> Acquisition<'a> {
     ) -> Option<Self> {
         let origin = (ensemble.lowest.min(0.0) - ensemble.offset) / ensemble.scale;
         let at = |x: &[f64], f: &Features| (value.predict(x, &f.value).0, standing.probability(x, f));
-        let predicted: Vec<(f64, f64)> = history.stood().map(|jump| at(&jump.point, &jump.features)).collect();
-        let safe = predicted.iter().filter(|(_, p)| *p >= INCUMBENT).map(|(mean, _)| *mean).reduce(f64::max);
+        let stood: Vec<(f64, f64)> = history.stood().map(|jump| at(&jump.point, &jump.features)).collect();
+        let safe = stood.iter().filter(|(_, p)| *p >= INCUMBENT).map(|(mean, _)| *mean).reduce(f64::max);
         // All stood by luck: the surest of them, less a unit.
-        let lucky =
-            || predicted.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(mean, _)| mean - 1.0);
+        let lucky = || stood.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(mean, _)| mean - 1.0);
         let incumbent = safe.or_else(lucky);
         let star = match incumbent {
             Some(incumbent) => incumbent - origin,
@@ -129,11 +125,11 @@ impl<'a> Acquisition<'a> {
                 gains.fold(0.0, f64::max)
             }
         };
-        let repeatable = history.stood().filter(|jump| jump.repeatable).cloned().collect();
         let value = value.believing(&history.pending)?;
         let price = config.fall_price * pow(ESCALATION, history.falls_in_a_row() as f64);
-        let (star, void, least) = (star.max(LEAST_STAR), history.void.clone(), config.least_p_stand);
-        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, price, least, void, repeatable })
+        let avoided = history.void.iter().chain(history.pending.iter().map(|(x, _)| x)).cloned().collect();
+        let (star, least) = (star.max(LEAST_STAR), config.least_p_stand);
+        Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, price, least, avoided })
     }
 
     /// Predicts at a point with its terms.
@@ -151,7 +147,9 @@ impl<'a> Acquisition<'a> {
     }
 
     /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not
-    /// worth their risk the one of the largest mean + deviation is the best ([`Acquisition::hope`]). Of the others the surest is.
+    /// worth their risk the one of the largest mean + deviation is the best, because EI is next to nothing at all of them; each that
+    /// stands makes points beyond it sure. It is counted from the incumbent: near void points the merit is reduced, and of a merit
+    /// counted from 0 a hundredth would be more than there is to gain. Of the others the surest is the best.
     fn score(&self, x: &[f64], features: &Features) -> Scored {
         let prediction = self.predict(x, features);
         let PointPrediction { mean, variance, p_stand } = prediction;
@@ -164,44 +162,27 @@ impl<'a> Acquisition<'a> {
         let (reason, merit) = if utility > 0.0 && p_stand >= self.least {
             (Reason::Gain, utility)
         } else if 1.0 - p_stand <= SURE * (1.0 - self.least) {
-            (Reason::Sure, self.hope(&prediction))
+            (Reason::Sure, mean + deviation - self.incumbent.unwrap_or(self.origin))
         } else {
             (Reason::Unsure, p_stand)
         };
-        Scored { point: x.to_vec(), score: self.score_at(reason, merit, x), prediction, repeated: None }
+        let away = self.away(x);
+        let score =
+            Score { reason, merit: if merit > 0.0 { merit * away } else { merit / away.max(f64::MIN_POSITIVE) } };
+        Scored { point: x.to_vec(), score, prediction }
     }
 
-    /// mean + deviation, because EI is next to nothing at all sure points; each that stands makes points beyond it sure. It is counted from
-    /// the incumbent: near void points the merit is reduced, and of a merit counted from 0 a hundredth would be more than there is to gain.
-    fn hope(&self, prediction: &PointPrediction) -> f64 {
-        prediction.mean + sqrt(prediction.variance) - self.incumbent.unwrap_or(self.origin)
-    }
-
-    /// The jumps that stood and are not sure to stand again, but as probable as a gain must be. If no gain is worth its risk, they count
-    /// as sure: standing again, the best of them makes the points about it sure, a lower sure point does not.
-    fn repetitions(&self, bounds: &[(f64, f64)]) -> Vec<Scored> {
-        let is_inside = |jump: &&Jump| jump.point.iter().zip(bounds).all(|(x, (low, high))| (low..=high).contains(&x));
-        let repetition = |jump: &Jump| {
-            let scored = self.score(&jump.point, &jump.features);
-            let is_unsure = scored.score.reason == Reason::Unsure && scored.prediction.p_stand >= self.least;
-            let score = self.score_at(Reason::Sure, self.hope(&scored.prediction), &jump.point);
-            is_unsure.then_some(Scored { score, repeated: Some(jump.number), ..scored })
-        };
-        self.repeatable.iter().filter(is_inside).filter_map(repetition).collect()
-    }
-
-    /// The score at x, its merit less near void points v: times the product of 1 - exp(-|x - v|^2 / 2 r^2).
-    fn score_at(&self, reason: Reason, merit: f64, x: &[f64]) -> Score {
+    /// Product over void and running points v of 1 - exp(-|x - v|^2 / 2 r^2)
+    fn away(&self, x: &[f64]) -> f64 {
         let away = |v: &Vec<f64>| {
             let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
             -expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))
         };
-        let away: f64 = self.void.iter().map(away).product();
-        Score { reason, merit: if merit > 0.0 { merit * away } else { merit / away.max(f64::MIN_POSITIVE) } }
+        self.avoided.iter().map(away).product()
     }
 
-    /// Searches the box, given as bounds in the prior's unit cube, from the candidates over it and the jumps that may be repeated, in
-    /// local rounds. Takes one double per coordinate.
+    /// Searches the box, given as bounds in the prior's unit cube, from the candidates over it, in local rounds. Takes one double per
+    /// coordinate.
     pub fn best_point(
         &self,
         candidates: &[(Vec<f64>, Features)],
@@ -210,7 +191,6 @@ impl<'a> Acquisition<'a> {
     ) -> Option<Scored> {
         let scatter = Sobol::new(bounds.len(), &mut streams.model);
         let mut ranked: Vec<Scored> = candidates.iter().map(|(x, features)| self.score(x, features)).collect();
-        ranked.extend(self.repetitions(bounds));
         ranked.sort_by(|a, b| b.score.cmp(&a.score));
         ranked.truncate(CENTRES);
         let mut best = ranked.first()?.clone();

@@ -17,7 +17,7 @@ const LEARNED: f64 = 0.7;
 /// Returns ln of the likelihood of the jumps under each world: of a value with the robot's bias and difference, of a label through the
 /// logistic prior. A world without a value explains no jump that stood.
 pub fn log_likelihoods(ensemble: &Ensemble, history: &History) -> Vec<f64> {
-    let [b0, b1, b2] = ensemble.standing.mean;
+    let [b0, b1, b2] = ensemble.standing.mean.into();
     // Of each jump that stood, of each world that has a value.
     let values: Vec<Vec<f64>> = history.stood().map(|jump| ensemble.world_values(&jump.point)).collect();
     let log_likelihood = |k: usize| {

@@ -1,10 +1,9 @@
 //! The trial panel: the proposal before the jump, the parameters while it runs, the measured values after it, and the
 //! best parameters when the study is finished.
 
-use quadfrog::optimize::repeats::RepeatedPoint;
-use quadfrog::session::experiment::points_of_rows;
 use quadfrog::trial::{
-    ExperimentStage, FallRisk, FixedParameter, PredictedTrial, Proposal, ProposedParameter, TrialRecord, Verdict,
+    ExpectedResult, ExperimentStage, FallRisk, FixedParameter, PredictedTrial, Proposal, ProposedParameter,
+    TrialRecord, Verdict,
 };
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -82,7 +81,7 @@ fn content(model: &Model, width: usize) -> PanelText {
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| proposed(session, theme, p, width)).collect();
             let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
             lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
-            lines.extend(expected(session, theme, proposal));
+            lines.extend(expected(session, theme, proposal.expected));
             if let Some(fallen) = void_fall(session, proposal) {
                 lines.push(Line::from(span(theme, Role::Warning, format!(" this point fell in #{fallen}"))));
             }
@@ -143,17 +142,15 @@ fn parameter(session: &SessionModel, theme: &Theme, p: &ProposedParameter, width
 }
 
 /// Expectation of the sampler's model of the trial, and its advice to end the search.
-fn expected(session: &SessionModel, theme: &Theme, proposal: &Proposal) -> Vec<Line<'static>> {
-    let Some(expected) = proposal.expected else { return Vec::new() };
+fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResult>) -> Vec<Line<'static>> {
+    let Some(expected) = expected else { return Vec::new() };
     let role = if expected.p_stand < 0.5 { Role::Warning } else { Role::Quiet };
     let mut lines =
         vec![Line::from(span(theme, role, format!(" {}", expectation(theme, &expected, &session.info.unit))))];
     if expected.advises_to_stop {
-        let other = match judged_before(session, proposal) {
-            Some(trial) => format!("repeat #{trial}, which can make points about it sure"),
-            None => "go on with sure points, which may show more".to_owned(),
-        };
-        let text = format!(" no gain is worth the risk of a fall: confirm the best, or {other}");
+        let text =
+            " no gain is worth the risk of a fall: confirm the best, or go on with sure points, which may show more"
+                .to_owned();
         lines.push(Line::from(span(theme, Role::Warning, text)));
     }
     if let (Some(least), Some(most)) = (expected.simulated_least, expected.simulated_most) {
@@ -161,14 +158,6 @@ fn expected(session: &SessionModel, theme: &Theme, proposal: &Proposal) -> Vec<L
         lines.push(Line::from(span(theme, Role::Quiet, text)));
     }
     lines
-}
-
-/// The first judged trial of the same point.
-fn judged_before(session: &SessionModel, proposal: &Proposal) -> Option<u32> {
-    let point: Vec<_> = proposal.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
-    let is_same = |known: &RepeatedPoint| known.parameters == point;
-    let same = points_of_rows(session.trials.records.values()).into_iter().find(is_same);
-    same?.trials.first().copied()
 }
 
 /// The void trial of the same point in which the robot fell: the risk counts judged trials alone.
