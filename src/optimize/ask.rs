@@ -77,7 +77,8 @@ pub struct SamplerConfig {
     pub startup_trials: Option<usize>,
     /// TPE: candidates drawn from l(x) for one proposal.
     pub candidates: usize,
-    /// `sim`: probability of standing, 0..1, below which no gain is worth a jump (`src/optimize/README.md`, "Ask").
+    /// `sim`: probability of standing, 0..1, below which no gain is worth a jump; three times the risk of a fall where the simulated
+    /// robots are left (`src/optimize/README.md`, "Ask").
     pub least_p_stand: f64,
     /// `sim`: price of a fall, as a share of the predicted value of the best jump so far. In `config/optimize.toml` each task has its own.
     #[serde(skip_deserializing)]

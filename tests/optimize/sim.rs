@@ -296,6 +296,27 @@ fn a_mirrored_simulator_is_left_for_the_values_that_contradict_it() {
     assert!(best > 0.9 * gp, "{best} {gp}");
 }
 
+/// Regression: with the bound of the simulated robots the search stayed where it had stood, and the twist lost a third against `gp`.
+#[test]
+fn where_the_simulated_robots_are_left_three_times_the_risk_is_accepted() {
+    let wrong = Arc::new(PriorModel::new(mirrored(prior_of(&WORLDS, 96))));
+    let mut worth = Vec::new();
+    for seed in 0..5 {
+        let mut study = study_with(&wrong, seed);
+        for _ in 0..10 {
+            let expected = study.draft().expected.unwrap();
+            if expected.worth_the_risk && !insight(&wrong, study.trials(), Direction::Maximize).unwrap().trusted {
+                worth.push(expected.p_stand);
+            }
+            jump(&mut study, &ROBOT);
+        }
+    }
+    println!("{worth:.2?}");
+    let least = worth.iter().copied().fold(1.0, f64::min);
+    // 0.85 where the simulated robots are not left.
+    assert!((0.55..0.83).contains(&least), "{least}");
+}
+
 /// With the standing of mirrored robots the search stayed where they stand, and the twist lost a sixth against `gp`.
 #[test]
 fn where_a_mirrored_simulator_stands_is_left_with_its_values() {

@@ -223,6 +223,11 @@ impl StandingModel {
         Some(model)
     }
 
+    /// Whether the model is about the simulated robots.
+    pub fn has_worlds(&self) -> bool {
+        self.shares.is_some()
+    }
+
     /// Covariances of the latent value at a point with those at the jumps.
     fn covariances(&self, x: &[f64], terms: &DVector<f64>) -> DVector<f64> {
         let weighted = &self.prior.covariance * terms;

@@ -17,6 +17,9 @@ const INCUMBENT: f64 = 0.5;
 /// Probability of a fall of a point that is sure enough to be proposed where no gain is worth its risk, as a share of the largest that
 /// is accepted.
 const SURE: f64 = 0.6;
+/// Factor of the accepted probability of a fall where standing is learned without the simulated robots: it is uncertain everywhere but
+/// about the jumps that stood, and with the accepted one the search would stay there.
+const WITHOUT_WORLDS: f64 = 3.0;
 /// Smallest J*, in scaled units.
 const LEAST_STAR: f64 = 1e-3;
 /// Half widths of the local rounds, as shares of the box.
@@ -128,7 +131,9 @@ impl<'a> Acquisition<'a> {
         let value = value.believing(&history.pending)?;
         let price = config.fall_price * pow(ESCALATION, history.falls_in_a_row() as f64);
         let avoided = history.void.iter().chain(history.pending.iter().map(|(x, _)| x)).cloned().collect();
-        let (star, least) = (star.max(LEAST_STAR), config.least_p_stand);
+        let accepted = 1.0 - config.least_p_stand;
+        let least = 1.0 - if standing.has_worlds() { accepted } else { WITHOUT_WORLDS * accepted };
+        let star = star.max(LEAST_STAR);
         Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, price, least, avoided })
     }
 
