@@ -215,7 +215,10 @@ impl StandingModel {
         let mut model = StandingModel { points, terms, shares, prior, hyper, posterior: None };
         let n = stood.len();
         if n > 0 {
-            let rows = model.points.iter().zip(&model.terms).map(|(x, terms)| model.covariances(x, terms).transpose());
+            let row = |(x, terms): (&Vec<f64>, &DVector<f64>)| {
+                model.covariances(x, &(&model.prior.covariance * terms)).transpose()
+            };
+            let rows = model.points.iter().zip(&model.terms).map(row);
             let k = DMatrix::from_rows(&rows.collect::<Vec<_>>());
             let mean = DVector::from_iterator(n, model.terms.iter().map(|h| h.dot(&model.prior.mean)));
             model.posterior = Some(Propagation::fit(&k, &mean, &stood)?);
@@ -228,9 +231,8 @@ impl StandingModel {
         self.shares.is_some()
     }
 
-    /// Covariances of the latent value at a point with those at the jumps.
-    fn covariances(&self, x: &[f64], terms: &DVector<f64>) -> DVector<f64> {
-        let weighted = &self.prior.covariance * terms;
+    /// Covariances of the latent value at a point with those at the jumps; `weighted`: the prior's covariance times the terms there.
+    fn covariances(&self, x: &[f64], weighted: &DVector<f64>) -> DVector<f64> {
         let covariance = |(p, h): (&Vec<f64>, &DVector<f64>)| self.hyper.kernel(x, p) + weighted.dot(h);
         DVector::from_iterator(self.points.len(), self.points.iter().zip(&self.terms).map(covariance))
     }
@@ -239,9 +241,10 @@ impl StandingModel {
     pub fn probability(&self, x: &[f64], features: &Features) -> f64 {
         let terms = terms(features, self.shares.as_deref());
         let mean = terms.dot(&self.prior.mean);
-        let variance = self.hyper.signal + terms.dot(&(&self.prior.covariance * &terms));
+        let weighted = &self.prior.covariance * &terms;
+        let variance = self.hyper.signal + terms.dot(&weighted);
         match &self.posterior {
-            Some(posterior) => posterior.probability(mean, &self.covariances(x, &terms), variance),
+            Some(posterior) => posterior.probability(mean, &self.covariances(x, &weighted), variance),
             None => averaged(mean, variance),
         }
     }

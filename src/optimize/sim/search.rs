@@ -143,12 +143,12 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, features) }
     }
 
-    /// Scaled value by which a jump that stood is compared for the best: the mean, counted from the value of a fall, times the root of P.
-    /// The whole P would be too much: it is too low about jumps that stood.
+    /// Scaled value by which a jump that stood is compared for the best: what a repetition is expected to be worth, P times the mean
+    /// counted from the value of a fall.
     pub fn worth(&self, prediction: &PointPrediction) -> f64 {
         let gain = prediction.mean - self.origin;
         // Below the value of a fall the risk of one is no loss.
-        self.origin + gain.min(gain * sqrt(prediction.p_stand))
+        self.origin + gain.min(gain * prediction.p_stand)
     }
 
     /// U = P EI - lambda 10^c J* (1 - P); before the first jump that stood the gain is J itself. Of the sure points whose gain is not

@@ -148,9 +148,7 @@ fn expected(session: &SessionModel, theme: &Theme, expected: Option<ExpectedResu
     let mut lines =
         vec![Line::from(span(theme, role, format!(" {}", expectation(theme, &expected, &session.info.unit))))];
     if expected.advises_to_stop {
-        let text =
-            " no gain is worth the risk of a fall: confirm the best, or go on with sure points, which may show more"
-                .to_owned();
+        let text = " no gain is worth the risk of a fall: confirm the best, or go on with sure points".to_owned();
         lines.push(Line::from(span(theme, Role::Warning, text)));
     }
     if let (Some(least), Some(most)) = (expected.simulated_least, expected.simulated_most) {
