@@ -1,5 +1,5 @@
-//! Prints the table "From simulated robots to others" of `src/optimize/README.md`: studies of the samplers on robots that are no
-//! members of the prior's ensemble.
+//! Prints the table "Other simulated robots" of `src/optimize/README.md`: studies of the samplers on robots that are no members of
+//! the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
 //! `trials`, `seed`, `jobs`, `least_p_stand` and `fall_price` (left out: those of the task's configuration), `backend` (`sim` or
