@@ -11,9 +11,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::pty::Session;
+use crate::pty::{STRICT, Session, Setup};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use portable_pty::CommandBuilder;
 use quadfrog::config::Config;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;
@@ -100,9 +101,11 @@ fn damping() -> Vec<u8> {
 }
 
 fn console(folder: &Path, robot: &RecordingRobot, more: &[&str]) -> Session {
-    let (address, model) = (robot.address.to_string(), model(folder));
-    let arguments = ["--robot", "go1", "--address", &address, "--model", model.to_str().unwrap()];
-    Session::start(folder, (120, 36), &[&arguments, more].concat())
+    let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["--robot", "go1", "--address", &robot.address.to_string()]);
+    command.args([Path::new("--output"), folder, Path::new("--model"), &model(folder)]);
+    command.args(more);
+    Session::run_in(folder, &Setup { size: (120, 36), cell: (0, 0), variables: &[STRICT] }, command)
 }
 
 /// A robot and the console in control of it, before arming.

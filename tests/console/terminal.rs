@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::pty::Session;
+use crate::pty::{STRICT, Session, Setup};
 use clap::Parser as _;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -246,11 +246,11 @@ fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
 }
 
 /// The console as a job of a shell, armed, and its process.
-fn job_of_a_shell(folder: &Path) -> (Session, Pid) {
+fn job_of_a_shell(folder: &Path, variables: &[(&str, &str)]) -> (Session, Pid) {
     let mut shell = CommandBuilder::new("bash");
     shell.args(["--norc", "--noprofile", "-i"]);
     shell.env("PS1", "shell> ");
-    let mut session = Session::run(folder, SIZE, shell);
+    let mut session = Session::run_in(folder, &Setup { size: SIZE, cell: (0, 0), variables }, shell);
     session.wait_for(&["shell>"]);
     session.send(&format!("{} --output .\r", env!("CARGO_BIN_EXE_quadfrog")));
     session.wait_for(&["Press A to arm"]);
@@ -272,7 +272,7 @@ fn end_shell(session: &mut Session) {
 #[test]
 fn stop_works_after_a_shell_had_the_terminal() {
     let folder = folder();
-    let (mut session, console) = job_of_a_shell(folder.path());
+    let (mut session, console) = job_of_a_shell(folder.path(), &[]);
     kill(console, Signal::SIGSTOP).unwrap();
     session.wait_for(&["Stopped"]);
     session.send("fg\r");
@@ -301,7 +301,7 @@ fn stop_works_after_a_shell_had_the_terminal() {
 #[test]
 fn a_console_in_the_background_runs_on_and_its_robot_sits_down() {
     let folder = folder();
-    let (mut session, console) = job_of_a_shell(folder.path());
+    let (mut session, console) = job_of_a_shell(folder.path(), &[STRICT]);
     kill(console, Signal::SIGSTOP).unwrap();
     session.wait_for(&["Stopped"]);
     session.send("clear; bg\r");

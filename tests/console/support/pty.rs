@@ -17,6 +17,12 @@ use portable_pty::{Child, CommandBuilder, ExitStatus, MasterPty, PtySize, native
 /// Time limit of every wait.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// The user's own configuration of every program: one that waits for a busy processor is not a lost operator.
+const PATIENT: (&str, &str) =
+    ("XDG_CONFIG_HOME", concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/console/support/user-configuration"));
+/// No configuration of the user's own. On hardware the other is refused.
+pub const STRICT: (&str, &str) = ("XDG_CONFIG_HOME", "/nonexistent");
+
 /// Output of the program so far.
 struct Output {
     parser: vt100::Parser,
@@ -87,12 +93,10 @@ impl Session {
         for name in ["NO_COLOR", "COLORFGBG", "TMUX", "STY", "ZELLIJ", "TERM_PROGRAM", "LC_TERMINAL"] {
             command.env_remove(name);
         }
-        let usual = [("TERM", "xterm-256color"), ("LANG", "C.UTF-8"), ("LC_ALL", "C.UTF-8")];
+        let usual = [PATIENT, ("TERM", "xterm-256color"), ("LANG", "C.UTF-8"), ("LC_ALL", "C.UTF-8")];
         for (name, value) in usual.iter().chain(setup.variables) {
             command.env(name, value);
         }
-        // Not the configuration of the user who runs the tests.
-        command.env("XDG_CONFIG_HOME", folder.join("no-configuration"));
         let child = pair.slave.spawn_command(command).expect("started");
         drop(pair.slave);
         let parser = vt100::Parser::new(nonzero(rows), nonzero(columns), 0);
