@@ -1,5 +1,7 @@
 //! The operator's next possible step.
 
+mod dialog;
+
 use quadfrog::engine::WHO_WATCHES;
 use quadfrog::robot::joint_name;
 use quadfrog::session::prior::PriorProgress;
@@ -9,10 +11,14 @@ use quadfrog::trial::{ExperimentStage, Verdict};
 use super::{countdown, row_keys};
 use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
-use crate::legal::{legal, may_request, waiting_trial_is_meant};
+use crate::legal::{legal, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
 use crate::model::Model;
-use crate::model::dialog::{Dialog, Purpose, Question};
+
+const OVERRIDE: (Action, &str) = (Action::Override, "override");
+const QUIT: (Action, &str) = (Action::Quit, "quit");
+const SIT_DOWN: (Action, &str) = (Action::SitDown, "sit down");
+const UNDO: (Action, &str) = (Action::Undo, "undo");
 
 /// The most likely next step, and the others.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,11 +68,11 @@ fn is_asked(model: &Model) -> bool {
 
 fn without_row(model: &Model) -> NextStep {
     match &model.dialog {
-        Some(dialog) => in_dialog(model, dialog),
+        Some(dialog) => dialog::in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
         None if model.session.info.observe && model.stop_requested() => observers_stop(model),
         None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
-            step("Observing: this session can change nothing.", model, &[(Action::Quit, "quit")])
+            step("Observing: this session can change nothing.", model, &[QUIT])
         }
         None => live(model),
     }
@@ -90,22 +96,22 @@ fn live(model: &Model) -> NextStep {
     let key = |action| model.keymap.key(action);
     let session = &model.session;
     let (stage, finished) = (session.stage.map(|info| info.stage), session.stage_is(ExperimentStage::Finished));
-    let (sit_down, undo, quit) = ((Action::SitDown, "sit down"), (Action::Undo, "undo"), (Action::Quit, "quit"));
-    let change = (Action::Override, "override");
     match model.mode() {
         Mode::Countdown => {
             let left = model.countdown_s.map_or(String::new(), |seconds| format!(" in {seconds} s"));
             step(format!("Jump{left}: {}.", countdown::cancels(model)), model, &[])
         }
         Mode::StandUp if session.jumps_without_question() && !finished => {
-            step("Standing up; the robot then jumps without a question.", model, &[sit_down])
+            step("Standing up; the robot then jumps without a question.", model, &[SIT_DOWN])
         }
-        Mode::StandUp => step("Standing up.", model, &[sit_down]),
-        Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[sit_down]),
+        Mode::StandUp => step("Standing up.", model, &[SIT_DOWN]),
+        Mode::Jump if session.jumps_in_a_row() > 1 => step(model.jump_series.line(session), model, &[SIT_DOWN]),
         Mode::Jump => step("Jumping.", model, &[]),
         Mode::Settle => step("Landed; waiting until the robot is quiet.", model, &[]),
         Mode::SitDown => step("Sitting down.", model, &[]),
-        mode if model.storage.is_some() && !matches!(mode, Mode::Damped | Mode::Fault) => {
+        // What a stopped robot needs comes before a wait and before the verdict.
+        Mode::Damped | Mode::Fault => of_stopped_robot(model),
+        _ if model.storage.is_some() => {
             let wait = model.storage.map(|wait| {
                 let waited_s = wait.waited.as_secs_f64();
                 match wait.prior {
@@ -116,111 +122,120 @@ fn live(model: &Model) -> NextStep {
                 }
             });
             let lead = format!("{}: the study answers later.", wait.unwrap_or_default());
-            step(lead, model, &[sit_down, quit])
+            step(lead, model, &[SIT_DOWN, QUIT])
         }
-        // What a stopped robot needs comes before the verdict.
-        mode if stage == Some(ExperimentStage::Review) && !matches!(mode, Mode::Damped | Mode::Fault) => review(model),
-        Mode::Damped | Mode::Fault => {
-            let cause = &session.stopped_because;
-            // A verdict is possible unless another row of Trials is selected.
-            let waiting = session.under_review().map(|trial| trial.trial);
-            let review = waiting.is_some() && waiting_trial_is_meant(model).is_ok();
-            // The cause of a fall stands beside its suggested verdict; STOP says itself why.
-            let is_stop = *cause == TransitionCause::Stop.to_string();
-            let stopped = stopped(model);
-            let because = match cause.is_empty() || is_stop || stopped == FELL && waiting.is_some() {
-                true => String::new(),
-                // Of an observer the name is enough: the keys of the verdict need the room. That it fell is said already.
-                false => {
-                    let cause = cause.strip_suffix(WHO_WATCHES).unwrap_or(cause);
-                    format!(": {}", cause.strip_prefix("fell: ").filter(|_| stopped == FELL).unwrap_or(cause))
-                }
-            };
-            // The key first: a long reason may be cut.
-            let acknowledge = key(Action::Acknowledge);
-            let mut lead = format!("{stopped}; check the robot, then {acknowledge} acknowledges{because}");
-            if lead.chars().count() + 2 > usize::from(MIN_COLUMNS) {
-                lead = format!("{stopped}; check it, {acknowledge} acknowledges{because}");
-            }
-            if let Some(trial) = waiting.filter(|_| !review) {
-                lead += &format!(". Trial {trial} waits for its verdict");
-            }
-            // A verdict can be given before the acknowledgement; the suggested one comes first.
-            let suggested = session.under_review().and_then(|trial| trial.suggested);
-            let mut verdicts = [
-                (Action::Fall, Verdict::Fall, "fall", "fall (suggested)"),
-                (Action::Accept, Verdict::Accept, "accept", "accept (suggested)"),
-                (Action::Void, Verdict::Void, "void", "void (suggested)"),
-            ];
-            verdicts.sort_by_key(|(_, verdict, ..)| Some(*verdict) != suggested);
-            let shown =
-                |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
-            let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
-            let rerun = if review { &[(Action::Rerun, "re-run")][..] } else { &[] };
-            // Of a fall a value by hand is not reported: the note comes first.
-            let about = [(Action::Note, "note"), (Action::HandValue, "value by hand")];
-            let about = if review { &about[..] } else { &[] };
-            step(lead, model, &[&verdicts[..], rerun, about, &[undo, quit]].concat())
-        }
+        _ if stage == Some(ExperimentStage::Review) => review(model),
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
             let lead = format!("{heard}, nothing was sent to it. {} takes control.", key(Action::TakeControl));
-            step(lead, model, &[quit])
+            step(lead, model, &[QUIT])
         }
-        Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[quit]),
+        Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[QUIT]),
         mode @ (Mode::Disarmed | Mode::Ready) if finished => {
             let more = [(Action::Continue, "more trials"), (Action::ConfirmBest, "confirm best")];
-            let (first, last) = if mode == Mode::Disarmed { (quit, None) } else { (sit_down, Some(quit)) };
-            let rest = [(Action::ExportBest, "export"), undo];
+            let (first, last) = if mode == Mode::Disarmed { (QUIT, None) } else { (SIT_DOWN, Some(QUIT)) };
+            let rest = [(Action::ExportBest, "export"), UNDO];
             step("The study is finished.", model, &[&[first], &more[..], &rest, last.as_slice()].concat())
         }
-        Mode::Disarmed => {
-            let lead = match session.failing_checks() {
-                _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
-                0 => {
-                    let stands = match (model.simulated_robot_lies(), session.jumps_without_question()) {
-                        (true, true) => "it is turned upright, then jumps without a question",
-                        (true, false) => "the robot is turned upright and stands",
-                        (false, true) => "it stands up, then jumps without a question",
-                        (false, false) => "the robot stands up",
-                    };
-                    format!("Press {} to arm: {stands}.", key(Action::Arm))
-                }
-                1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
-                failing => {
-                    let shows = key(Action::ArmingChecks);
-                    format!("Not ready to arm: {failing} checks have not passed. {shows} shows them.")
-                }
-            };
-            let short = match session.failing_checks() {
-                _ if session.arming_checks.is_empty() => String::new(),
-                0 if session.jumps_without_question() => format!("Press {} to arm: it then jumps.", key(Action::Arm)),
-                0 => format!("Press {} to arm.", key(Action::Arm)),
-                _ => format!("{} shows failed checks.", key(Action::ArmingChecks)),
-            };
-            NextStep { short, ..step(lead, model, &[change, undo, (Action::Help, "help"), quit]) }
-        }
+        Mode::Disarmed => before_arming(model),
         Mode::Ready if session.open_proposal().is_some() && model.snapshot.unready.is_some() => {
             let reason = model.snapshot.unready.map(|reason| reason.to_string()).unwrap_or_default();
-            step(format!("No jump now: {reason}."), model, &[sit_down, change, (Action::Skip, "skip"), undo])
+            step(format!("No jump now: {reason}."), model, &[SIT_DOWN, OVERRIDE, (Action::Skip, "skip"), UNDO])
         }
-        Mode::Ready if session.open_proposal().is_some() => {
-            let approve = key(Action::Approve);
-            let times = if session.info.is_hardware() { "" } else { " twice" };
-            let press = format!("Press {approve}{times} to jump");
-            let lead = match (session.info.is_hardware(), session.jumps_without_question()) {
-                (true, _) => format!("{press}: y confirms the area, {approve} again jumps."),
-                // An interruption has paused the rule.
-                (false, true) => format!("{press}. The next jumps follow without a question."),
-                (false, false) => format!("{press}."),
-            };
-            let short = format!("{press}.");
-            NextStep { short, ..step(lead, model, &[change, (Action::Skip, "skip"), undo, sit_down]) }
-        }
+        Mode::Ready if session.open_proposal().is_some() => before_jump(model),
         // The mode is shown a moment before the measured values arrive.
         Mode::Review if stage == Some(ExperimentStage::Running) => step("Measuring the jump.", model, &[]),
-        _ => step("The sampler is choosing the next trial.", model, &[sit_down]),
+        _ => step("The sampler is choosing the next trial.", model, &[SIT_DOWN]),
     }
+}
+
+/// The step of a robot that waits for an acknowledgement: it may come before or after the verdict.
+fn of_stopped_robot(model: &Model) -> NextStep {
+    let session = &model.session;
+    let cause = &session.stopped_because;
+    // A verdict is possible unless another row of Trials is selected.
+    let waiting = session.under_review().map(|trial| trial.trial);
+    let review = waiting.is_some() && waiting_trial_is_meant(model).is_ok();
+    // The cause of a fall stands beside its suggested verdict; STOP says itself why.
+    let is_stop = *cause == TransitionCause::Stop.to_string();
+    let stopped = stopped(model);
+    let because = match cause.is_empty() || is_stop || stopped == FELL && waiting.is_some() {
+        true => String::new(),
+        // Of an observer the name is enough: the keys of the verdict need the room. That it fell is said already.
+        false => {
+            let cause = cause.strip_suffix(WHO_WATCHES).unwrap_or(cause);
+            format!(": {}", cause.strip_prefix("fell: ").filter(|_| stopped == FELL).unwrap_or(cause))
+        }
+    };
+    // The key first: a long reason may be cut.
+    let acknowledge = model.keymap.key(Action::Acknowledge);
+    let mut lead = format!("{stopped}; check the robot, then {acknowledge} acknowledges{because}");
+    if lead.chars().count() + 2 > usize::from(MIN_COLUMNS) {
+        lead = format!("{stopped}; check it, {acknowledge} acknowledges{because}");
+    }
+    if let Some(trial) = waiting.filter(|_| !review) {
+        lead += &format!(". Trial {trial} waits for its verdict");
+    }
+    // A verdict can be given before the acknowledgement; the suggested one comes first.
+    let suggested = session.under_review().and_then(|trial| trial.suggested);
+    let mut verdicts = [
+        (Action::Fall, Verdict::Fall, "fall", "fall (suggested)"),
+        (Action::Accept, Verdict::Accept, "accept", "accept (suggested)"),
+        (Action::Void, Verdict::Void, "void", "void (suggested)"),
+    ];
+    verdicts.sort_by_key(|(_, verdict, ..)| Some(*verdict) != suggested);
+    let shown = |(action, verdict, name, first)| (action, if Some(verdict) == suggested { first } else { name });
+    let verdicts: Vec<_> = verdicts.into_iter().filter(|_| review).map(shown).collect();
+    let rerun = if review { &[(Action::Rerun, "re-run")][..] } else { &[] };
+    // Of a fall a value by hand is not reported: the note comes first.
+    let about = [(Action::Note, "note"), (Action::HandValue, "value by hand")];
+    let about = if review { &about[..] } else { &[] };
+    step(lead, model, &[&verdicts[..], rerun, about, &[UNDO, QUIT]].concat())
+}
+
+fn before_arming(model: &Model) -> NextStep {
+    let key = |action| model.keymap.key(action);
+    let session = &model.session;
+    let lead = match session.failing_checks() {
+        _ if session.arming_checks.is_empty() => "Checking the robot.".to_owned(),
+        0 => {
+            let stands = match (model.simulated_robot_lies(), session.jumps_without_question()) {
+                (true, true) => "it is turned upright, then jumps without a question",
+                (true, false) => "the robot is turned upright and stands",
+                (false, true) => "it stands up, then jumps without a question",
+                (false, false) => "the robot stands up",
+            };
+            format!("Press {} to arm: {stands}.", key(Action::Arm))
+        }
+        1 => format!("Not ready to arm: 1 check has not passed. {} shows it.", key(Action::ArmingChecks)),
+        failing => {
+            let shows = key(Action::ArmingChecks);
+            format!("Not ready to arm: {failing} checks have not passed. {shows} shows them.")
+        }
+    };
+    let short = match session.failing_checks() {
+        _ if session.arming_checks.is_empty() => String::new(),
+        0 if session.jumps_without_question() => format!("Press {} to arm: it then jumps.", key(Action::Arm)),
+        0 => format!("Press {} to arm.", key(Action::Arm)),
+        _ => format!("{} shows failed checks.", key(Action::ArmingChecks)),
+    };
+    NextStep { short, ..step(lead, model, &[OVERRIDE, UNDO, (Action::Help, "help"), QUIT]) }
+}
+
+fn before_jump(model: &Model) -> NextStep {
+    let key = |action| model.keymap.key(action);
+    let session = &model.session;
+    let approve = key(Action::Approve);
+    let times = if session.info.is_hardware() { "" } else { " twice" };
+    let press = format!("Press {approve}{times} to jump");
+    let lead = match (session.info.is_hardware(), session.jumps_without_question()) {
+        (true, _) => format!("{press}: y confirms the area, {approve} again jumps."),
+        // An interruption has paused the rule.
+        (false, true) => format!("{press}. The next jumps follow without a question."),
+        (false, false) => format!("{press}."),
+    };
+    let short = format!("{press}.");
+    NextStep { short, ..step(lead, model, &[OVERRIDE, (Action::Skip, "skip"), UNDO, SIT_DOWN]) }
 }
 
 /// The effect of an observer's STOP, which another commander may counteract.
@@ -233,7 +248,7 @@ fn observers_stop(model: &Model) -> NextStep {
         }
         None => format!("STOP requested and followed: the joints are damped. {key} releases the robot."),
     };
-    step(lead, model, &[(Action::Quit, "quit")])
+    step(lead, model, &[QUIT])
 }
 
 fn review(model: &Model) -> NextStep {
@@ -242,7 +257,7 @@ fn review(model: &Model) -> NextStep {
         let live = model.keymap.key(Action::LiveView);
         let lead = format!("Trial {} waits for its verdict: select its row or press {live}.", waiting.trial);
         let short = format!("Trial {} waits for its verdict: press {live}.", waiting.trial);
-        return NextStep { short, ..step(lead, model, &[(Action::SitDown, "sit down"), (Action::Quit, "quit")]) };
+        return NextStep { short, ..step(lead, model, &[SIT_DOWN, QUIT]) };
     }
     let verdicts = [(Action::Accept, Verdict::Accept), (Action::Fall, Verdict::Fall), (Action::Void, Verdict::Void)];
     let (first, others): (Vec<_>, Vec<_>) = verdicts.into_iter().partition(|(_, verdict)| Some(*verdict) == suggested);
@@ -291,16 +306,12 @@ fn replay(model: &Model) -> NextStep {
             (false, Some(old)) => format!("{old} The session may hang: STOP reaches its robot once it is confirmed."),
             (false, None) => "Watching, about 1 s behind. STOP reaches the robot of this session at once.".to_owned(),
         };
-        return step(
-            lead,
-            model,
-            &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest")],
-        );
+        return step(lead, model, &[QUIT, (Action::PlayPause, "pause or play"), (Action::ReplayEnd, "newest")]);
     }
     let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
     let key = model.keymap.key(Action::PlayPause);
     if let Some(old) = old.filter(|_| model.replay.as_ref().is_some_and(ReplayStatus::later_is_known)) {
-        return step(old, model, &[(Action::Quit, "quit"), (Action::PlayPause, "pause or play")]);
+        return step(old, model, &[QUIT, (Action::PlayPause, "pause or play")]);
     }
     let mut others = vec![
         (Action::EndComparison, "end comparison"),
@@ -311,7 +322,7 @@ fn replay(model: &Model) -> NextStep {
         (Action::StepForward, "step"),
         (Action::Slower, "slower"),
         (Action::Faster, "faster"),
-        (Action::Quit, "quit"),
+        QUIT,
     ];
     others.retain(|(action, _)| *action != Action::NextFall || fall_follows(model));
     step(format!("{key} {}", if playing { "pauses" } else { "plays" }), model, &others)
@@ -335,121 +346,4 @@ fn stopped(model: &Model) -> &'static str {
         _ if fell || session.stopped_because.starts_with("fell: ") => FELL,
         _ => "STOPPED",
     }
-}
-
-/// The step of an open dialog. A stopped robot comes before what the dialog asks.
-fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
-    let step = of_dialog(model, dialog);
-    if !model.stop_requested() || legal(Action::Acknowledge, model).is_err() {
-        return step;
-    }
-    let stopped = stopped(model);
-    let acknowledge = model.keymap.key(Action::Acknowledge);
-    if let Some(ends) = ends_of_form(dialog) {
-        return NextStep { lead: format!("{stopped}: {ends}; then {acknowledge} acknowledges."), ..step };
-    }
-    let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
-    NextStep { lead: format!("{stopped}: {way}{acknowledge} acknowledges. {}", step.lead), ..step }
-}
-
-/// The two ends of a form with values of the operator, the one that keeps them first; none of another dialog.
-fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
-    Some(match dialog {
-        Dialog::Field { .. } if dialog.lacks_content() => "Esc cancels",
-        _ if dialog.has_refused_character() => "Enter twice confirms, Esc cancels",
-        Dialog::Override(_) => "Enter applies, Esc drops the values",
-        Dialog::Field { purpose: Purpose::Note(_), .. } => "Enter keeps the note, Esc drops it",
-        Dialog::Field { purpose: Purpose::HandValue(_), .. } => "Enter uses the value, Esc drops it",
-        Dialog::Field { purpose: Purpose::VoidReason { .. } | Purpose::ChangeVerdict { .. }, .. } => {
-            "Enter gives the verdict, Esc cancels"
-        }
-        Dialog::Field { .. } => "Enter confirms, Esc cancels",
-        _ => return None,
-    })
-}
-
-fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
-    let key = |action| model.keymap.key(action);
-    let close = format!("{} close.", model.keymap.closing_keys());
-    let lead = match dialog {
-        Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
-            format!("Type y if the area is clear (trial #{trial}). Any other key cancels.")
-        }
-        Dialog::Approve { trial, .. } => {
-            format!("Press {} again to jump (trial #{trial}). Any other key cancels.", key(Action::Approve))
-        }
-        Dialog::Arm { typed, .. } => {
-            let left = model.session.arming_confirmation().get(*typed..).unwrap_or_default();
-            format!("Type {left} to stand the robot up. Any other key cancels.")
-        }
-        Dialog::ArmingChecks { .. } => {
-            let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
-            match model.session.info.is_hardware() {
-                true => format!("Up Down choose, x confirms, PgUp PgDn Home End scroll, {close}{arms}"),
-                false => format!("Up Down PgUp PgDn Home End scroll, {close}{arms}"),
-            }
-        }
-        Dialog::Override(form) if dialog.has_refused_character() => {
-            let (keys, esc) =
-                if form.typing.is_some() { ("Enter, Up, Down", "drops the number") } else { ("Enter", "cancels") };
-            format!("{keys} and {} work when pressed twice, Esc {esc}.", key(Action::QueuePoint))
-        }
-        Dialog::Override(form) if form.typing.is_none() => {
-            let queue = key(Action::QueuePoint);
-            format!("Type, or Left Right 1 %, PgUp PgDn 10 %. Enter applies, {queue} queues, Esc cancels.")
-        }
-        Dialog::Override(_) => "Enter applies the number. Esc drops it; Esc again closes.".to_owned(),
-        Dialog::TakeControl => "Press y to take control. Any other key cancels.".to_owned(),
-        Dialog::Confirm(Question::Skip { trial, .. }) => {
-            format!("Press y to skip trial #{trial}. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::JudgeAnyway { trial, verdict: Verdict::Fall }) => {
-            format!("Press y to judge trial #{trial} a fall. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::JudgeAnyway { trial, .. }) => {
-            format!("Press y to accept trial #{trial}. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::Rerun { trial }) => {
-            format!("Press y to queue trial #{trial} again. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::QueueProposed { .. }) => {
-            "Press y to queue the values. Any other key cancels.".to_owned()
-        }
-        Dialog::Confirm(Question::RemoveQueued { trial }) => {
-            format!("Press y to remove trial #{trial} from the queue. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::FewRepeats { .. }) => {
-            "Press y to repeat all the same. Any other key goes back to the field.".to_owned()
-        }
-        Dialog::Confirm(Question::EndRepeats) => "Press y to end the repeats. Any other key cancels.".to_owned(),
-        Dialog::Confirm(Question::Undo { trial }) => {
-            format!("Press y to take the verdict of trial #{trial} back. Any other key cancels.")
-        }
-        Dialog::Confirm(Question::HandValue { .. }) => {
-            "Press y to use the value. Any other key goes back to the field.".to_owned()
-        }
-        Dialog::Quit => "Press y to quit. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose, .. } if purpose.is_remark() && model.space_bar_must_stop() => {
-            "Enter saves the text, Esc cancels. Energised: Space is STOP, _ writes a space.".to_owned()
-        }
-        Dialog::Export { .. } => "Press a for all trials, s for those shown. Any other key cancels.".to_owned(),
-        Dialog::Field { purpose, .. } => {
-            let enter = match purpose.needed().filter(|_| dialog.lacks_content()) {
-                Some(needed) => format!("Type {needed}"),
-                None if dialog.has_refused_character() => "Enter twice confirms".to_owned(),
-                None => "Enter confirms".to_owned(),
-            };
-            let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
-            format!("{enter}, Esc cancels.{space}")
-        }
-        Dialog::Palette { .. } => "Type to filter, Up Down Home End choose, Enter does it, Esc closes.".to_owned(),
-        Dialog::Choose { .. } => format!("Up Down Home End choose, x switches it on or off, {close}"),
-        Dialog::Queue { .. } if model.session.queue().is_empty() => close,
-        Dialog::Queue { .. } if may_request(model).is_err() => format!("Up Down Home End choose, {close}"),
-        Dialog::Queue { .. } => format!("Up Down Home End choose, Left Right move it, x removes, {close}"),
-        Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn Home End scroll, {close}"),
-        Dialog::Details { .. } => format!("Up Down Home End other trials, PgUp PgDn scroll, {close}"),
-        Dialog::LogLine { .. } => format!("Up Down Home End other lines, PgUp PgDn scroll, {close}"),
-    };
-    NextStep { lead, short: String::new(), others: Vec::new() }
 }
