@@ -619,6 +619,28 @@ fn a_jump_that_stood_by_luck_is_not_the_best_by_a_little_more() {
     }
 }
 
+/// The best of a study is a jump to be repeated: it is worth what is expected of it if it stands, else the value of a fall, one for all
+/// jumps.
+#[test]
+fn jumps_are_compared_by_what_a_repetition_is_expected_to_be_worth() {
+    let mut study = right(0);
+    let points = [[0.5, 0.7, 0.9], [0.5, 0.9, 0.4], [0.3, 0.9, 0.6], [0.5, 0.8, 0.3]];
+    for (point, value) in points.iter().zip([Some(0.4), None, Some(0.45), Some(0.42)]) {
+        jump_at(&mut study, point, value);
+    }
+    let predicted = study.predict();
+    let falls: Vec<f64> = (predicted.trials.iter().zip(points))
+        .map(|(prediction, point)| {
+            let Expectation { value, p_stand, .. } = expected_at(&study, &point);
+            assert!((prediction.value - value).abs() < 1e-12 && p_stand < 0.99, "{prediction:?}, {value}, {p_stand}");
+            (prediction.worth - p_stand * value) / (1.0 - p_stand)
+        })
+        .collect();
+    assert!(falls.iter().all(|fall| (fall - falls[0]).abs() < 1e-9 && *fall < 0.0), "{falls:?}");
+    let most = predicted.trials.iter().filter(|p| p.stood).max_by(|a, b| a.worth.total_cmp(&b.worth)).unwrap();
+    assert_eq!(predicted.best.unwrap().trial, most.trial);
+}
+
 #[test]
 fn one_to_six_parameters_are_searched() {
     for d in [1, 6] {
