@@ -1,29 +1,13 @@
-//! The step of an open dialog.
+//! The questions of open dialogs, and the keys that answer.
 
-use super::{NextStep, stopped};
 use crate::action::Action;
 use crate::legal::{legal, may_request};
 use crate::model::Model;
 use crate::model::dialog::{Dialog, Purpose, Question};
 use quadfrog::trial::Verdict;
 
-/// The step of an open dialog. A stopped robot comes before what the dialog asks.
-pub(super) fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
-    let step = of_dialog(model, dialog);
-    if !model.stop_requested() || legal(Action::Acknowledge, model).is_err() {
-        return step;
-    }
-    let stopped = stopped(model);
-    let acknowledge = model.keymap.key(Action::Acknowledge);
-    if let Some(ends) = ends_of_form(dialog) {
-        return NextStep { lead: format!("{stopped}: {ends}; then {acknowledge} acknowledges."), ..step };
-    }
-    let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
-    NextStep { lead: format!("{stopped}: {way}{acknowledge} acknowledges. {}", step.lead), ..step }
-}
-
 /// The two ends of a form with values of the operator, the one that keeps them first; none of another dialog.
-fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
+pub(super) fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
     Some(match dialog {
         Dialog::Field { .. } if dialog.lacks_content() => "Esc cancels",
         _ if dialog.has_refused_character() => "Enter twice confirms, Esc cancels",
@@ -38,10 +22,11 @@ fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
     })
 }
 
-fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
+/// The question of a dialog.
+pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
     let key = |action| model.keymap.key(action);
     let close = format!("{} close.", model.keymap.closing_keys());
-    let lead = match dialog {
+    match dialog {
         Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
             format!("Type y if the area is clear (trial #{trial}). Any other key cancels.")
         }
@@ -120,6 +105,5 @@ fn of_dialog(model: &Model, dialog: &Dialog) -> NextStep {
         Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn Home End scroll, {close}"),
         Dialog::Details { .. } => format!("Up Down Home End other trials, PgUp PgDn scroll, {close}"),
         Dialog::LogLine { .. } => format!("Up Down Home End other lines, PgUp PgDn scroll, {close}"),
-    };
-    NextStep { lead, short: String::new(), others: Vec::new() }
+    }
 }

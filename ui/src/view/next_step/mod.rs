@@ -14,6 +14,7 @@ use crate::layout::MIN_COLUMNS;
 use crate::legal::{legal, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
 use crate::model::Model;
+use crate::model::dialog::Dialog;
 
 const OVERRIDE: (Action, &str) = (Action::Override, "override");
 const QUIT: (Action, &str) = (Action::Quit, "quit");
@@ -68,7 +69,7 @@ fn is_asked(model: &Model) -> bool {
 
 fn without_row(model: &Model) -> NextStep {
     match &model.dialog {
-        Some(dialog) => dialog::in_dialog(model, dialog),
+        Some(dialog) => in_dialog(model, dialog),
         None if model.replay.is_some() => replay(model),
         None if model.session.info.observe && model.stop_requested() => observers_stop(model),
         None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
@@ -346,4 +347,22 @@ fn stopped(model: &Model) -> &'static str {
         _ if fell || session.stopped_because.starts_with("fell: ") => FELL,
         _ => "STOPPED",
     }
+}
+
+/// The step of an open dialog. A stopped robot comes before what the dialog asks.
+fn in_dialog(model: &Model, dialog: &Dialog) -> NextStep {
+    let question = dialog::question(model, dialog);
+    if !model.stop_requested() || legal(Action::Acknowledge, model).is_err() {
+        return step(question, model, &[]);
+    }
+    let stopped = stopped(model);
+    let acknowledge = model.keymap.key(Action::Acknowledge);
+    let lead = match dialog::ends_of_form(dialog) {
+        Some(ends) => format!("{stopped}: {ends}; then {acknowledge} acknowledges."),
+        None => {
+            let way = if matches!(dialog, Dialog::Details { .. }) { "" } else { "Esc, then " };
+            format!("{stopped}: {way}{acknowledge} acknowledges. {question}")
+        }
+    };
+    step(lead, model, &[])
 }
