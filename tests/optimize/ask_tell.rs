@@ -85,7 +85,7 @@ fn the_points_are_those_of_a_study_with_the_same_results() {
 fn a_study_has_the_price_of_a_fall_of_its_task() {
     let layer = ConfigLayer { file: "optimize.toml", origin: "the test", text: "[fall_price]\ntwist-cw = 0.3" };
     let config = Config::layered(&[layer]).unwrap();
-    for (task, price) in [(Task::Forward, 0.05), (Task::LateralRight, 0.2), (Task::TwistCw, 0.3)] {
+    for (task, price) in [(Task::Forward, 0.05), (Task::LateralRight, 0.5), (Task::TwistCw, 0.3)] {
         let study =
             open_study(&Options { config: config.clone(), task, ..options(SamplerKind::Gp) }, Durability::Buffered);
         let study = study.unwrap();
