@@ -7,7 +7,8 @@
 Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, the motors of
 reference_motors.py, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Contact, end and
 value of a jump are those of quadfrog's trials (config/control.toml). Prints a JSON line for each study: the value of the best trial after
-1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted. `--joints` gives the robots the rotors of the Go1,
+1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted; whether each jump stood, and with which probability
+the sampler `sim` expected it to. `--joints` gives the robots the rotors of the Go1,
 and dry and viscous friction of the joints drawn from the ranges of config/prior.toml. The task `continuous` is five jumps forward in a
 row, its value their mean length; `--config` is then a folder with that task, as examples/continuous without its first point. SI units,
 radians.
@@ -71,13 +72,14 @@ def study(program, task, sampler, seed, config, jumps, joints):
         talk.stdin.flush()
         return json.loads(talk.stdout.readline())
 
-    trials, best, falls, known = [], [], [], {}
+    trials, best, falls, known, expected = [], [], [], {}, []
     for number in range(jumps):
         asked = say({"ask": {}})
         value = robot.value(task, asked["params"], 1000 * seed + number)
         verdict = "fall" if value is None else "accept"
         say({"tell": {"number": asked["number"], "value": value or 0.0, "verdict": verdict}})
         trials.append((asked["params"], value))
+        expected.append(asked.get("p_stand"))
         if number + 1 in AFTER:
             chosen = say({"best": {}}).get("number", 0)
             if chosen not in known:
@@ -88,7 +90,8 @@ def study(program, task, sampler, seed, config, jumps, joints):
     talk.stdin.close()
     talk.wait()
     robot = dict(friction=robot.friction, mass=robot.mass, lag_s=robot.lag_s, full_torque_share=robot.full_torque_share)
-    return dict(task=task, sampler=sampler, seed=seed, after=AFTER[: len(best)], best=best, falls=falls, robot=robot)
+    after, stood = AFTER[: len(best)], [value is not None for _, value in trials]
+    return dict(task=task, sampler=sampler, seed=seed, after=after, best=best, falls=falls, stood=stood, p_stand=expected, robot=robot)
 
 
 def main():
