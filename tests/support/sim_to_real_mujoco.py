@@ -8,10 +8,9 @@ Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_la
 reference_motors.py, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Contact, end and
 value of a jump are those of quadfrog's trials (config/control.toml). Prints a JSON line for each study: the value of the best trial after
 1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted; whether each jump stood, and with which probability
-the sampler `sim` expected it to. `--joints` gives the robots the rotors of the Go1,
-and dry and viscous friction of the joints drawn from the ranges of config/prior.toml. The task `continuous` is five jumps forward in a
-row, its value their mean length; `--config` is then a folder with that task, as examples/continuous without its first point. SI units,
-radians.
+the sampler `sim` expected it to. `--joints` gives the robots the rotors of the Go1, and dry and viscous friction of the joints drawn from
+the ranges of config/prior.toml. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a
+folder with that task, as examples/continuous without its first point. SI units, radians.
 """
 
 import argparse
