@@ -247,3 +247,21 @@ fn no_sampler_proposes_the_point_of_a_void_trial_again() {
         assert_eq!(study.trial(again).unwrap().parameters, queued);
     }
 }
+
+/// Regression: from six variables on the ascent multiplied matrices with fused instructions where the machine has them: other last bits
+/// on another machine, and with them other proposals in a study of four or more parameters.
+#[test]
+fn an_ascent_of_seven_variables_has_the_bits_of_plain_arithmetic() {
+    let hill = |x: &[f64]| {
+        let slope = |i: usize| {
+            let (u, next) = (x[i] - 0.1 * (i + 1) as f64, x[(i + 1) % x.len()]);
+            (-u * u * (1.0 + u * u) - 0.3 * u * next, -2.0 * u - 4.0 * u * u * u - 0.3 * next)
+        };
+        let before = |i: usize| x[(i + 6) % 7] - 0.1 * ((i + 6) % 7 + 1) as f64;
+        let value = (0..x.len()).map(|i| slope(i).0).sum::<f64>();
+        (value, (0..x.len()).map(|i| slope(i).1 - 0.3 * before(i)).collect())
+    };
+    let (top, _) = ascent::maximize(hill, &[0.9; 7], &[(-1.0, 1.0); 7], 8);
+    let bits: Vec<u8> = top.iter().flat_map(|x| x.to_bits().to_le_bytes()).collect();
+    assert_eq!(format!("{:08x}", crc32fast::hash(&bits)), "4a09b911", "{top:?}");
+}
