@@ -78,6 +78,61 @@ fn an_override_changes_the_expectation() {
     assert_eq!(experiment.row(after.trial).unwrap().expected, after.expected);
 }
 
+fn imported(values: [f64; 3], value: f64) -> TableTrial {
+    TableTrial {
+        state: TrialState::Complete,
+        value: Some(value),
+        parameters: ["f0", "Fx", "Fz"].map(str::to_owned).into_iter().zip(values).collect(),
+        attributes: serde_json::Map::new(),
+        started: None,
+        completed: None,
+        note: String::new(),
+    }
+}
+
+/// Regression: a waiting proposal went on to say what had been expected of it before another program added results.
+#[test]
+fn the_expectation_of_a_waiting_proposal_is_that_of_the_results_that_another_program_adds() {
+    for kind in [SamplerKind::Gp, SamplerKind::Sim] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("study.log");
+        let mut ours = study(kind, Storage::File(file.clone()));
+        ours.use_prior(prior([0.8, 1.0, 1.6]));
+        let mut experiment = Experiment::open(plan(12), ours).unwrap();
+        run(&mut experiment, 8, &[]);
+        let before = experiment.proposal().unwrap();
+        let near = [0, 1, 2].map(|i| before.parameters[i].value + [0.01, 1.0, 1.0][i]);
+        import(&mut study(kind, Storage::File(file)), vec![imported(near, 0.2)]).unwrap();
+        experiment.refresh().unwrap();
+        let now = experiment.proposal().unwrap();
+        assert_eq!((now.revision, &now.parameters), (before.revision, &before.parameters));
+        let (was, is) = (before.expected.unwrap(), now.expected.unwrap());
+        assert!(is.value < was.value - 0.05, "{kind:?}: {was:?}, then {is:?}");
+        let shown = experiment.take_records().into_iter().rev().find_map(|record| match record {
+            Record::Proposal(proposal) => proposal.expected,
+            _ => None,
+        });
+        assert_eq!(shown, Some(is));
+        let spec = experiment.approve(now.trial, now.revision).unwrap();
+        assert_eq!(experiment.row(spec.trial).unwrap().expected, Some(is));
+    }
+}
+
+/// Regression: a change of one value took away the advice that no gain is worth its risk, as if the search had learned of one.
+#[test]
+fn the_advice_to_end_the_search_outlasts_an_override() {
+    let mut study = study(SamplerKind::Sim, Storage::Memory);
+    study.use_prior(prior([0.8, 1.0, 1.6]));
+    let mut experiment = Experiment::open(plan(60), study).unwrap();
+    let advises = |experiment: &Experiment| experiment.proposal().unwrap().expected.unwrap().advises_to_stop;
+    while !advises(&experiment) {
+        run(&mut experiment, 1, &[]);
+    }
+    let value = experiment.proposal().unwrap().parameters[1].value;
+    experiment.set_parameter("Fx", value - 10.0).unwrap();
+    assert!(advises(&experiment));
+}
+
 /// Regression: the reported best was the luckiest jump, 14 % above the mean of its repeats on the hardware-like robot.
 #[test]
 fn the_best_of_a_study_with_a_model_is_the_best_mean_and_not_the_luckiest_jump() {
@@ -214,15 +269,7 @@ fn readers_have_the_best_of_the_session_by_the_model_after_every_verdict_and_aft
     agree(&experiment, "with the last trial");
     let opened = open_stored(&storage(), None, &Config::load(None).unwrap()).unwrap();
     let best = opened.rows().into_iter().find(|row| Some(row.trial) == opened.model_best().map(|best| best.trial));
-    let table = TableTrial {
-        state: TrialState::Complete,
-        value: Some(5.0),
-        parameters: best.unwrap().parameters.to_vec(),
-        attributes: serde_json::Map::new(),
-        started: None,
-        completed: None,
-        note: String::new(),
-    };
+    let table = TableTrial { parameters: best.unwrap().parameters.to_vec(), ..imported([0.0; 3], 5.0) };
     let imported = import(&mut study(SamplerKind::Gp, storage()), vec![table]).unwrap();
     experiment.refresh().unwrap();
     assert_eq!(experiment.model_best().map(|best| best.learned), Some(10));

@@ -60,6 +60,13 @@ pub struct TrialDraft {
     pub(super) waiting: Option<u64>,
 }
 
+impl TrialDraft {
+    /// The proposed values by name.
+    pub fn point(&self) -> Vec<(String, f64)> {
+        self.parameters.iter().map(|p| (p.name.clone(), p.value)).collect()
+    }
+}
+
 impl Study {
     /// Computes the next proposal without effect; a second call returns the same. The enqueued trial of lowest number comes
     /// first.

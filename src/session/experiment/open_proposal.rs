@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::attributes::{self, Origin};
 use super::changes::Changes;
 use super::plan::{RequestRefusal, must_be};
-use crate::optimize::ask::{Prediction, SamplerKind};
+use crate::optimize::ask::{Expectation, Prediction, SamplerKind};
 use crate::optimize::insight;
 use crate::optimize::sim::insight::{PriorInsight, WorldWeight};
 use crate::optimize::study::{ModelPredictions, Study, TrialDraft};
@@ -94,9 +94,14 @@ impl OpenProposal {
         self.draft.number = number;
     }
 
-    /// Takes the results of `study` for its risk and for what is expected of its values.
+    /// Takes the results of `study`, which draws its points where this proposal's study does, for its risk and for what is expected of
+    /// its values. Whether a gain was worth its risk stays as the sampler found it for this draft.
     pub fn see(&mut self, study: Study) {
         self.study = study;
+        let now = self.study.expect(&self.draft.point());
+        if let (Some(drafted), Some(now)) = (&mut self.draft.expected, now) {
+            *drafted = Expectation { worth_the_risk: drafted.worth_the_risk, ..now };
+        }
     }
 
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
@@ -226,7 +231,8 @@ impl OpenProposal {
             p_stand: expected.p_stand,
             simulated_least: expected.worlds.map(|(least, _)| least),
             simulated_most: expected.worlds.map(|(_, most)| most),
-            advises_to_stop: !expected.worth_the_risk,
+            // Advice on the search, not on the values.
+            advises_to_stop: self.draft.expected.is_some_and(|drafted| !drafted.worth_the_risk),
         })
     }
 
@@ -251,7 +257,7 @@ impl OpenProposal {
                 name,
             }
         };
-        let parameters = self.draft.parameters.iter().map(|p| (p.name.clone(), p.value)).map(parameter).collect();
+        let parameters = self.draft.point().into_iter().map(parameter).collect();
         ProposalInsight { trial: self.number(), parameters, ..model_insight(model) }
     }
 }

@@ -112,9 +112,10 @@ impl Experiment {
 
     /// Shows what the results of other programs say of the open proposal. Its values and its revision stay.
     fn see_results(&mut self) -> Result<(), StudyError> {
-        let study = self.study_with_verdict()?;
+        let mut study = self.study_with_verdict()?;
         let model = study.predict();
         self.model_best = model.best;
+        self.draw_inside_envelope(&mut study);
         self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
         let ExperimentState::Proposed(open) = &mut self.state else { return Ok(()) };
         open.see(study);

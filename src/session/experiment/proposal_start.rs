@@ -51,11 +51,7 @@ impl Experiment {
         let model = study.predict();
         self.model_best = model.best;
         self.hop_share = envelope::share(&self.plan, study.trials());
-        if let Some(inside) =
-            self.hop_share.and_then(|share| envelope::inside(&study.options().space, &self.plan, share))
-        {
-            study.draw_inside(inside);
-        }
+        self.draw_inside_envelope(&mut study);
         self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
         self.publish_search(&study);
         let confirms = study.waiting().next().is_some_and(attributes::confirms);
@@ -86,6 +82,14 @@ impl Experiment {
             self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
         Ok(())
+    }
+
+    /// Has `study` draw its points where the next trial may jump.
+    pub(super) fn draw_inside_envelope(&self, study: &mut Study) {
+        let inside = self.hop_share.and_then(|share| envelope::inside(&study.options().space, &self.plan, share));
+        if let Some(inside) = inside {
+            study.draw_inside(inside);
+        }
     }
 
     /// Reads the trials and the search of the study.
@@ -166,8 +170,7 @@ impl Experiment {
         if only_with_verdict {
             // The study does not have the queued trial yet, and another program may have taken its number.
             if queued.is_none() {
-                let given: Vec<_> = draft.parameters.iter().map(|p| (p.name.clone(), p.value)).collect();
-                queued = confirmation::queue_repeat(&mut self.study, &given, &origin.attributes())?;
+                queued = confirmation::queue_repeat(&mut self.study, &draft.point(), &origin.attributes())?;
             }
             let Some(number) = queued else {
                 self.propose()?;
