@@ -147,8 +147,10 @@ impl AskTell {
     fn tell(&mut self, tell: &TellMessage) -> Result<Value, String> {
         let TellMessage { number, value, verdict } = *tell;
         let state = self.study.trial(number).map_err(|error| error.to_string())?.state;
-        if state != TrialState::Running {
-            return Err(format!("trial {number} was told before; ask for another point"));
+        match state {
+            TrialState::Running => {}
+            TrialState::Waiting => return Err(format!("trial {number} is queued; ask for it first")),
+            _ => return Err(format!("trial {number} was told before; ask for another point")),
         }
         let (outcome, value) = match (verdict, value) {
             (Verdict::Accept, None) => {
@@ -158,8 +160,8 @@ impl AskTell {
             (Verdict::Fall, _) => (Outcome::Complete(0.0), Some(0.0)),
             (Verdict::Void, _) => (Outcome::Fail, None),
         };
-        let told = self.study.annotate(number, &[(VERDICT.to_owned(), verdict.name().into())]);
-        match told.and_then(|()| self.study.tell(number, outcome)) {
+        let attributes = [(VERDICT.to_owned(), verdict.name().into())];
+        match self.study.tell_if(number, outcome, &attributes, &|_| true) {
             Ok(TellOutcome::Recorded) => Ok(json!({ "told": number, "verdict": verdict.name(), "value": value })),
             Ok(TellOutcome::AlreadyFinished) => Err(format!("trial {number} was finished by another program")),
             Err(error) => Err(error.to_string()),

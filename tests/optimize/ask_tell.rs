@@ -140,6 +140,20 @@ fn falls_and_voids_are_told_and_errors_change_nothing() {
     assert_eq!(answer(&mut served, r#"{"ask":{}}"#)["number"], json!(3));
 }
 
+/// Regression: a result of a point that was queued and not asked for yet was refused as told before.
+#[test]
+fn a_result_of_a_queued_point_asks_for_the_point_first() {
+    let mut queued = study(SamplerKind::Gp);
+    queued.enqueue(&[("Fx".into(), 77.0)], &[]).unwrap();
+    let mut served = AskTell::new(queued);
+    let tell = r#"{"tell":{"number":0,"value":0.5,"verdict":"accept"}}"#;
+    assert_eq!(error(&mut served, tell), "trial 0 is queued; ask for it first");
+    assert!(error(&mut served, r#"{"tell":{"number":0,"verdict":"void"}}"#).contains("is queued"));
+    let asked = answer(&mut served, r#"{"ask":{}}"#);
+    assert_eq!((&asked["number"], &asked["params"]["Fx"]), (&json!(0), &json!(77.0)));
+    assert_eq!(answer(&mut served, tell)["told"], json!(0));
+}
+
 fn serve(served: &mut AskTell, input: &[u8], buffer: usize) -> Vec<Value> {
     let mut answers = Vec::new();
     let answered = |line: &str| answers.push(serde_json::from_str(line).unwrap());
