@@ -242,20 +242,22 @@ fn make_prior(supervisor: &mut Supervisor, maker: PriorMaker, options: &Options,
         return supervisor.log(LogLevel::Warning, message.to_owned(), time_ns);
     }
     let files = maker.files(options);
-    supervisor.make_prior(time_ns, move |work| {
-        let mut messages = Vec::new();
+    supervisor.make_prior(time_ns, move |work, messages| {
         let progress = |progress| work.report(progress);
         let jobs = cores().saturating_sub(1).max(1);
-        let found = maker.find_or_make(&files, jobs, &progress, work.interrupted(), &mut |text| messages.push(text));
+        let mut notice = |text| messages.push((LogLevel::Warning, text));
+        let found = maker.find_or_make(&files, jobs, &progress, work.interrupted(), &mut notice);
         let ready = found.map_err(|error| error.to_string())?;
-        messages.push(match &ready.from {
+        let source = match &ready.from {
             Some(file) => format!("the prior of the sampler sim is that of {}", file.display()),
             None => "the prior of the sampler sim is made".to_owned(),
-        });
+        };
+        messages.push((LogLevel::Info, source));
         if let Err(error) = ready.keep(&files) {
-            messages.push(format!("{error}; the prior is used, and made again by the next session"));
+            let text = format!("{error}; the prior is used, and made again by the next session");
+            messages.push((LogLevel::Warning, text));
         }
-        Ok((ready.model, messages))
+        Ok(ready.model)
     });
 }
 

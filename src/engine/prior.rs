@@ -17,7 +17,7 @@ use crate::control::settings::ControlSettings;
 use crate::optimize::prior::{Prior, PriorModel};
 use crate::optimize::space::Space;
 use crate::robot::description::{RobotDescription, read_text_within};
-use crate::session::prior::{PriorPlan, PriorProgress, simulate};
+use crate::session::prior::{PriorPlan, PriorProgress, SIMULATION_VERSION, simulate};
 use crate::trial::{Backend, ParameterInfo, Task};
 
 /// Name of the prior in the folder of its study.
@@ -57,7 +57,7 @@ struct PriorFile {
     /// Version of the program that made it.
     program: String,
     task: Task,
-    /// [`PriorKey`] of the robot, the configuration and the task.
+    /// [`PriorMaker::key`] of the robot, the configuration and the task.
     key: String,
     /// CRC-32 of the JSON text of `prior`.
     checksum: u32,
@@ -76,7 +76,7 @@ pub enum PriorFileError {
     Newer { path: PathBuf, version: u32 },
     #[error("{}: the prior is damaged: {reason}", path.display())]
     Damaged { path: PathBuf, reason: String },
-    #[error("{}: the prior is of another robot, configuration, task or program version", path.display())]
+    #[error("{}: the prior is of another robot, configuration, task or version of the simulation", path.display())]
     Other { path: PathBuf },
 }
 
@@ -133,7 +133,7 @@ impl PriorMaker {
     }
 
     /// Short name of everything that the prior depends on: the robot's files, the configuration without what belongs to screens
-    /// and samplers, the task with the bounds of its parameters, the backend, the version of the program. FNV-1a, 64 bits.
+    /// and samplers, the task with the bounds of its parameters, the backend, the versions of program and simulation. FNV-1a, 64 bits.
     pub fn key(&self) -> &str {
         &self.key
     }
@@ -286,7 +286,8 @@ fn key(config: &Config, robot: &RobotDescription, task: Task, backend: Backend) 
         Backend::Simulator => config.optimize.objective.as_deref().unwrap_or_default(),
         Backend::Hardware => backend.name(),
     };
-    let rest = format!("{} {} {source} {parameters}", env!("CARGO_PKG_VERSION"), task.name());
+    let versions = format!("{} {SIMULATION_VERSION}", env!("CARGO_PKG_VERSION"));
+    let rest = format!("{versions} {} {source} {parameters}", task.name());
     let texts = files.flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]);
     fnv1a(texts.chain([rest.as_bytes()]))
 }

@@ -13,7 +13,7 @@ use std::time::Duration;
 use super::experiment::{Experiment, RequestRefusal};
 use super::prior::{PriorProgress, PriorWork};
 use crate::optimize::journal::{JournalWait, WaitedFor};
-use crate::recording::record::Record;
+use crate::recording::record::{LogLevel, Record};
 use crate::telemetry::TrialSpec;
 use crate::trial::{ExperimentStage, Verdict};
 
@@ -30,8 +30,8 @@ pub enum JobOutput {
     Approved(Result<TrialSpec, String>),
     /// A trial was measured or withdrawn, or the study was read or closed.
     Done(Result<(), RequestRefusal>),
-    /// The sampler has its prior: messages for the operator; or the reason why it has none.
-    Prior(Result<Vec<String>, String>),
+    /// Messages of the work on the sampler's prior, and the reason if it has none.
+    Prior(Vec<(LogLevel, String)>, Result<(), String>),
 }
 
 /// A job that was carried out.

@@ -9,7 +9,9 @@ use quadfrog::engine::{fingerprint, prior_plan};
 use quadfrog::optimize::prior::Prior;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::evaluation::evaluate;
-use quadfrog::session::prior::{EnsembleError, PriorPlan, PriorProgress, draw_robot, ensemble, simulate};
+use quadfrog::session::prior::{
+    EnsembleError, PriorPlan, PriorProgress, SIMULATION_VERSION, draw_robot, ensemble, simulate,
+};
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::{ActuatorKind, SimConfig, Simulator};
 use quadfrog::telemetry::TrialSpec;
@@ -52,6 +54,22 @@ fn a_prior_has_the_same_bits_on_any_number_of_threads() {
     assert!(one.worlds.iter().all(|world| world.values.len() == one.points.len() && one.points.len() == 16));
     let falls = bits(&one).iter().filter(|value| value.is_none()).count();
     assert!(0 < falls && falls < 32, "{falls} of 32 jumps fell: the points do not cover the bounds");
+}
+
+/// Regression: the file of a prior was used again after a change of the simulation.
+#[test]
+fn a_change_of_the_simulated_jumps_raises_the_version_of_the_simulation() {
+    let fitted = |task| {
+        let mut prior = make(&small(task, &[("prior.toml", "points = 32")]), 2);
+        prior.fit().unwrap();
+        serde_json::to_vec(&prior).unwrap()
+    };
+    let sum = crc32fast::hash(&Task::ALL.map(fitted).concat());
+    assert_eq!(
+        (SIMULATION_VERSION, format!("{sum:08x}").as_str()),
+        (1, "06597672"),
+        "priors of the same configuration have become others: raise SIMULATION_VERSION and write both numbers here"
+    );
 }
 
 /// A value is the objective that a study of the same robot measures at that point.

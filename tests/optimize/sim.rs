@@ -566,10 +566,13 @@ fn a_prior_of_other_parameters_leaves_the_proposals_to_gp() {
 #[test]
 fn a_damaged_prior_is_not_used_and_says_why() {
     type Damage<'a> = &'a dyn Fn(&mut Prior);
-    let damage: [(Damage<'_>, &str); 6] = [
+    let damage: [(Damage<'_>, &str); 9] = [
         (&|prior| prior.points[3][1] = 1.5, "point 3 of the prior has 2 coordinates in 0..1, 3 are needed"),
         (&|prior| prior.points.truncate(9), "the prior has 9 points"),
         (&|prior| prior.worlds[1].values.truncate(95), "world \"world 2\" of the prior has 95 values, 96 are needed"),
+        (&|prior| prior.parameters[0].range = Range::linear(1.0, 0.0), "bounds 1..0 are not a range"),
+        (&|prior| prior.parameters[0].range = Range::logarithmic(0.0, 1.0), "its lower bound must be above 0"),
+        (&|prior| prior.parameters[1] = prior.parameters[0].clone(), "is given twice"),
         (&|prior| prior.worlds[0].values[7] = Some(f64::NAN), "world \"world 1\" of the prior has 95 values"),
         (&|prior| prior.worlds.iter_mut().for_each(|w| w.values.fill(None)), "no simulated robot stood 8 times"),
         (&|prior| prior.worlds.iter_mut().for_each(|w| w.values.fill(Some(1e308))), ""),

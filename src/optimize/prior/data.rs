@@ -1,12 +1,13 @@
 //! The prior as plain numbers, as its file keeps them.
 
-use crate::optimize::space::Parameter;
+use crate::optimize::space::{Parameter, Space, SpaceError};
 use serde::{Deserialize, Serialize};
 
 /// Least number of points of a prior.
 pub const LEAST_POINTS: usize = 16;
 /// Jumps that a world must have stood for a surface of its value.
 pub const LEAST_STOOD: usize = 8;
+
 /// Jumps of simulated robots at shared points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
@@ -16,7 +17,7 @@ pub struct Prior {
     pub points: Vec<Vec<f64>>,
     /// The simulated robots.
     pub worlds: Vec<World>,
-    /// Names of the parameters that push sideways and up; none for a task whose falls they do not explain.
+    /// Names of the parameters that push sideways and up; none unless the parameters have both.
     pub slip: Option<SlipParameters>,
     /// Hyperparameters of the surfaces; none before [`Prior::fit`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -58,6 +59,8 @@ pub enum PriorModelError {
         "the prior has {points} points and {worlds} worlds: at least {least_points} points and one world are needed"
     )]
     Size { points: usize, worlds: usize, least_points: usize },
+    #[error("the parameters of the prior are damaged, make it again: {0}")]
+    Space(#[from] SpaceError),
     #[error(
         "point {point} of the prior has {found} coordinates in 0..1, {expected} are needed: the file is damaged, make it again"
     )]
@@ -94,6 +97,7 @@ impl Prior {
             let worlds = self.worlds.len();
             return Err(PriorModelError::Size { points: n, worlds, least_points: LEAST_POINTS });
         }
+        Space::new(self.parameters.iter().map(|p| (p.name.clone(), p.range)))?;
         for (point, x) in self.points.iter().enumerate() {
             let inside = x.iter().filter(|x| (0.0..=1.0).contains(*x)).count();
             if x.len() != d || inside != d {

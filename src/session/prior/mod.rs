@@ -22,6 +22,10 @@ use crate::sim::{SimConfig, SimError, Simulator};
 use crate::telemetry::TrialSpec;
 use crate::trial::{JumpParameters, ParameterInfo, ParameterValues, Task, Verdict};
 
+/// Number that every change of the simulation, the controller or the surfaces raises by which the prior of the same configuration
+/// becomes another: files of another number are made again.
+pub const SIMULATION_VERSION: u32 = 1;
+
 /// Inputs of a prior.
 #[derive(Debug, Clone)]
 pub struct PriorPlan {

@@ -33,21 +33,20 @@ impl Supervisor {
     }
 
     /// Makes the prior of the sampler behind the session: requests to the study are answered after it, STOP, sit down and cancel
-    /// at once. `make` returns the prior and messages for the operator; it ends soon after [`PriorWork::interrupt`], which the end
-    /// of the session calls.
+    /// at once. `make` returns the prior and adds messages for the operator, also where it fails; it ends soon after
+    /// [`PriorWork::interrupt`], which the end of the session calls.
     pub fn make_prior(
         &mut self,
         time_ns: u64,
-        make: impl FnOnce(&PriorWork) -> Result<(Arc<PriorModel>, Vec<String>), String> + Send + 'static,
+        make: impl FnOnce(&PriorWork, &mut Vec<(LogLevel, String)>) -> Result<Arc<PriorModel>, String> + Send + 'static,
     ) {
         let work = self.experiment.prior_work();
         self.give(JobPurpose::Prior, time_ns, move |experiment| {
-            let made = make(&work);
+            let mut messages = Vec::new();
+            let made = make(&work, &mut messages);
             work.end();
-            let used = made.and_then(|(prior, messages)| {
-                experiment.use_prior(prior).map(|()| messages).map_err(|error| error.to_string())
-            });
-            JobOutput::Prior(used)
+            let used = made.and_then(|prior| experiment.use_prior(prior).map_err(|error| error.to_string()));
+            JobOutput::Prior(messages, used)
         });
     }
 
@@ -126,17 +125,19 @@ impl Supervisor {
             (JobPurpose::Refresh, JobOutput::Done(Err(error))) => {
                 self.log(LogLevel::Error, format!("the study could not be read: {error}"), time_ns);
             }
-            (JobPurpose::Prior, JobOutput::Prior(Ok(messages))) => {
-                for message in messages {
-                    self.log(LogLevel::Info, message, time_ns);
+            (JobPurpose::Prior, JobOutput::Prior(messages, used)) => {
+                for (level, message) in messages {
+                    self.log(level, message, time_ns);
                 }
-            }
-            // A session that ends has interrupted it.
-            (JobPurpose::Prior, JobOutput::Prior(Err(reason))) if !self.closing => {
-                let message = format!(
-                    "the sampler sim has no prior: {reason}. Nothing is proposed; quit, and start again or with another --sampler"
-                );
-                self.log(LogLevel::Error, message, time_ns);
+                // A session that ends has interrupted it.
+                if let Err(reason) = used
+                    && !self.closing
+                {
+                    let message = format!(
+                        "the sampler sim has no prior: {reason}. Nothing is proposed; quit, and start again or with another --sampler"
+                    );
+                    self.log(LogLevel::Error, message, time_ns);
+                }
             }
             (JobPurpose::Withdraw | JobPurpose::Close, JobOutput::Done(Err(error))) => {
                 self.log(LogLevel::Error, format!("the study could not be written: {error}"), time_ns);
