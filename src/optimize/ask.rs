@@ -80,7 +80,8 @@ pub struct SamplerConfig {
     /// `sim`: probability of standing, 0..1, below which no gain is worth a jump; three times the risk of a fall where the simulated
     /// robots are left (`src/optimize/README.md`, "Ask").
     pub least_p_stand: f64,
-    /// `sim`: price of a fall, as a share of the predicted value of the best jump so far. In `config/optimize.toml` each task has its own.
+    /// `sim`: price of a fall, as a share of the predicted value of the best jump so far, counted from the lowest value of the simulated
+    /// robots where that is negative. In `config/optimize.toml` each task has its own.
     #[serde(skip_deserializing)]
     pub fall_price: f64,
 }

@@ -10,6 +10,7 @@ pub mod insight;
 pub mod journal;
 pub mod model_free;
 pub mod mt19937;
+pub mod observations;
 pub mod parzen;
 pub mod prior;
 pub mod repeats;

@@ -21,9 +21,9 @@ pub mod regression;
 
 use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::model_free;
+use super::observations::{ObservedTrial, TrialPoints};
 use super::sobol::Sobol;
 use super::space::Parameter;
-use super::trial::TrialState;
 use super::truncnorm::{HALF_LN_TWO_PI, log_cdf};
 use falls::StandProbability;
 use libm::{exp, expm1, log, log1p};
@@ -39,10 +39,10 @@ const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 const CENTRES: usize = 3;
 /// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
 pub const VOID_RADIUS: f64 = 0.1;
-/// Finished trials from which on a proposal must stand with [`LEAST_P_STAND`]. Before, the classifier knows little, and the search
-/// would stay among the careful points.
+/// Finished trials from which on a probability of standing below [`LEAST_P_STAND`] reduces the acquisition. Before, the classifier
+/// knows little, and the search would stay among the careful points.
 const CAREFUL_FROM: usize = 10;
-/// Least probability of standing of a proposal: about 1.5 falls of 20 jumps fewer at no loss of value
+/// Probability of standing that a proposal should have: about 1.5 falls of 20 jumps fewer at no loss of value
 /// (`src/optimize/README.md`).
 const LEAST_P_STAND: f64 = 0.8;
 /// Reduction of the acquisition per unit of missing probability. Among points that are all too risky a sure one is chosen; a larger
@@ -58,7 +58,7 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     if given.iter().all(Option::is_some) {
         return given.into_iter().flatten().collect::<Vec<f64>>().into();
     }
-    let model = Acquisition::of(ask, &TrainingSet::gather(ask));
+    let model = Acquisition::of(ask, points_of(ask));
     let Some(model) = model else { return model_free::sobol(ask, streams) };
     let bound =
         |(p, given): (&Parameter, &Option<f64>)| given.map_or((0.0, 1.0), |v| (p.range.scale(v), p.range.scale(v)));
@@ -72,75 +72,34 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
 
 /// Returns what the model expects of a trial at `values`; none before the model proposes.
 pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
-    let model = Acquisition::of(ask, &TrainingSet::gather(ask))?;
+    let model = Acquisition::of(ask, points_of(ask))?;
     let point: Vec<f64> = ask.space.parameters().iter().zip(values).map(|(p, v)| p.range.scale(*v)).collect();
     Some(model.expectation(&point, ask.direction))
 }
 
 /// Returns what the model says of the finished trials; empty before the model proposes.
 pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
-    let training = TrainingSet::gather(ask);
-    let Some(model) = Acquisition::of(ask, &training) else { return Vec::new() };
-    let prediction = |((trial, stood), point): ((&u32, &bool), &Vec<f64>)| {
-        let Expectation { value, deviation, .. } = model.expectation(point, ask.direction);
-        Prediction { trial: *trial, stood: *stood, value, deviation, worth: value }
+    let points = points_of(ask);
+    let observed = points.observed.clone();
+    let Some(model) = Acquisition::of(ask, points) else { return Vec::new() };
+    let prediction = |trial: &ObservedTrial| {
+        let Expectation { value, deviation, .. } = model.expectation(&trial.point, ask.direction);
+        Prediction { trial: trial.number, stood: trial.stood, value, deviation, worth: value }
     };
-    training.numbers.iter().zip(&training.stood).zip(&training.points).map(prediction).collect()
+    observed.iter().map(prediction).collect()
 }
 
-/// The trials as points of the unit cube.
-#[derive(Default)]
-struct TrainingSet {
-    /// Points of all observed trials.
-    points: Vec<Vec<f64>>,
-    /// Numbers of these trials.
-    numbers: Vec<u32>,
-    /// Whether each trial ended without a fall.
-    stood: Vec<bool>,
-    /// Values of the trials without a fall, larger is better.
-    values: Vec<f64>,
-    /// Points of running trials.
-    pending: Vec<Vec<f64>>,
-    /// Points of void trials.
-    void: Vec<Vec<f64>>,
+/// The trials of the question as points of the unit cube of its space.
+fn points_of(ask: &Ask<'_>) -> TrialPoints {
+    TrialPoints::of(ask.trials, ask.space.parameters(), ask.direction)
 }
 
-impl TrainingSet {
-    fn gather(ask: &Ask<'_>) -> Self {
-        let mut set = TrainingSet::default();
-        for trial in ask.trials {
-            let coordinate = |p: &Parameter| trial.parameter(&p.name).map(|v| p.range.scale(v));
-            let Some(point) = ask.space.parameters().iter().map(coordinate).collect::<Option<Vec<f64>>>() else {
-                continue;
-            };
-            match (trial.state, trial.value) {
-                (TrialState::Running, _) => set.pending.push(point),
-                (TrialState::Fail, _) => set.void.push(point),
-                (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
-                    set.points.push(point);
-                    set.numbers.push(trial.number);
-                    set.stood.push(!trial.is_fall());
-                    if !trial.is_fall() {
-                        set.values.push(ask.direction.maximized(value));
-                    }
-                }
-                _ => {}
-            }
-        }
-        // A point that was run again has a result: the interrupted trial leaves no trace.
-        set.void.retain(|point| !set.points.contains(point) && !set.pending.contains(point));
-        set
-    }
-
-    /// One value per point; falls have the lower quartile of the other values.
-    fn values_with_falls(&self) -> Vec<f64> {
-        let mut sorted = self.values.clone();
-        sorted.sort_by(f64::total_cmp);
-        let low = sorted.get(sorted.len() / 4).copied().unwrap_or(0.0);
-        let mut stood = self.values.iter();
-        let value = |s: &bool| if *s { stood.next().copied().unwrap_or(low) } else { low };
-        self.stood.iter().map(value).collect()
-    }
+/// One value per trial; falls have the lower quartile of the other values.
+fn values_with_falls(observed: &[ObservedTrial]) -> Vec<f64> {
+    let mut sorted: Vec<f64> = observed.iter().filter(|trial| trial.stood).map(|trial| trial.value).collect();
+    sorted.sort_by(f64::total_cmp);
+    let low = sorted.get(sorted.len() / 4).copied().unwrap_or(0.0);
+    observed.iter().map(|trial| if trial.stood { trial.value } else { low }).collect()
 }
 
 /// The acquisition function: the expected gain of a trial at a point.
@@ -153,27 +112,30 @@ struct Acquisition {
     centres: Vec<Vec<f64>>,
     /// Points of void trials.
     void: Vec<Vec<f64>>,
-    /// Least probability of standing.
+    /// [`LEAST_P_STAND`], once it counts.
     least_p_stand: f64,
 }
 
 impl Acquisition {
     /// Learns from the trials of a study; none before there are enough.
-    fn of(ask: &Ask<'_>, training: &TrainingSet) -> Option<Self> {
-        let enough = training.points.len() >= ask.config.startup_trials(ask.space) && training.values.len() >= 2;
-        enough.then(|| Acquisition::new(training)).flatten()
+    fn of(ask: &Ask<'_>, points: TrialPoints) -> Option<Self> {
+        let stood = points.observed.iter().filter(|trial| trial.stood).count();
+        let enough = points.observed.len() >= ask.config.startup_trials(ask.space) && stood >= 2;
+        enough.then(|| Acquisition::new(points)).flatten()
     }
 
-    fn new(training: &TrainingSet) -> Option<Self> {
-        let process = GaussianProcess::fit(training.points.clone(), &training.values_with_falls())?;
+    fn new(TrialPoints { observed, pending, void }: TrialPoints) -> Option<Self> {
+        let values = values_with_falls(&observed);
+        let (points, stood): (Vec<_>, Vec<_>) = observed.into_iter().map(|trial| (trial.point, trial.stood)).unzip();
+        let stand_probability = StandProbability::fit(&points, &stood);
+        let process = GaussianProcess::fit(points, &values)?;
         let mut ranked: Vec<(f64, &Vec<f64>)> = process.points().iter().map(|p| (process.predict(p).0, p)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let incumbent = ranked.first()?.0;
         let centres = ranked.iter().take(CENTRES).map(|(_, p)| (*p).clone()).collect();
-        let stand_probability = StandProbability::fit(&training.points, &training.stood);
-        let least_p_stand = if training.points.len() >= CAREFUL_FROM { LEAST_P_STAND } else { 0.0 };
-        let process = process.believing(&training.pending)?;
-        Some(Acquisition { process, stand_probability, incumbent, centres, void: training.void.clone(), least_p_stand })
+        let least_p_stand = if values.len() >= CAREFUL_FROM { LEAST_P_STAND } else { 0.0 };
+        let process = process.believing(&pending)?;
+        Some(Acquisition { process, stand_probability, incumbent, centres, void, least_p_stand })
     }
 
     /// ln EI(x) + ln P(stands at x) - c max(p - P(stands at x), 0) + sum over void points v of ln(1 - exp(-|x - v|^2 / 2 r^2))

@@ -57,11 +57,10 @@ impl GaussianProcess {
 }
 
 fn hyper_prior() -> HyperPrior {
-    let prior = |median, width, (low, high)| LogNormal { median, width, bounds: (log(low), log(high)) };
     HyperPrior {
-        lengthscale: prior(-0.35, 0.5, (0.03, 20.0)),
-        signal: prior(0.0, 1.0, (0.05, 20.0)),
-        noise: prior(-7.0, 2.0, (1e-7, 0.5)),
+        lengthscale: LogNormal::new(-0.35, 0.5, (0.03, 20.0)),
+        signal: LogNormal::new(0.0, 1.0, (0.05, 20.0)),
+        noise: LogNormal::new(-7.0, 2.0, (1e-7, 0.5)),
         // Two starts, smooth with little noise and rough with more.
         starts: vec![[log(0.7), 0.0, log(1e-4)], [log(0.25), 0.0, log(1e-2)]],
     }

@@ -61,6 +61,13 @@ pub struct LogNormal {
     pub bounds: (f64, f64),
 }
 
+impl LogNormal {
+    /// From ln of the median, the width, and the smallest and the largest value that is tried.
+    pub fn new(median: f64, width: f64, (smallest, largest): (f64, f64)) -> LogNormal {
+        LogNormal { median, width, bounds: (log(smallest), log(largest)) }
+    }
+}
+
 /// Priors of the hyperparameters, and the points from which the ascent of their posterior starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HyperPrior {
@@ -137,7 +144,7 @@ impl LinearPrior {
         terms.iter().zip(&self.mean).map(|(h, b)| h * b).sum()
     }
 
-    /// h' diag(L) h'
+    /// a' diag(L) b
     pub fn covariance(&self, a: &[f64], b: &[f64]) -> f64 {
         a.iter().zip(b).zip(&self.variance).map(|((a, b), l)| a * b * l).sum()
     }

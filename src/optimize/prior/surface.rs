@@ -7,7 +7,7 @@ use super::data::{LEAST_STOOD, Prior, PriorModelError, SurfaceHyperparameters, W
 use crate::optimize::gp::regression::{
     HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood, matern,
 };
-use libm::{log, sqrt};
+use libm::sqrt;
 use nalgebra::{DMatrix, DVector};
 
 /// Points of a world from which the hyperparameters are fitted: the cost grows with their cube, and all worlds count together.
@@ -148,11 +148,10 @@ fn fit_series(prior: &Prior, series: &[Series]) -> Option<Vec<f64>> {
 }
 
 fn hyper_prior() -> HyperPrior {
-    let prior = |median, width, (low, high)| LogNormal { median, width, bounds: (log(low), log(high)) };
     HyperPrior {
-        lengthscale: prior(-1.0, 1.0, (0.05, 20.0)),
-        signal: prior(0.0, 1.0, (1e-4, 20.0)),
-        noise: prior(-5.0, 2.0, (1e-6, 0.5)),
+        lengthscale: LogNormal::new(-1.0, 1.0, (0.05, 20.0)),
+        signal: LogNormal::new(0.0, 1.0, (1e-4, 20.0)),
+        noise: LogNormal::new(-5.0, 2.0, (1e-6, 0.5)),
         starts: vec![[-0.5, 0.0, -4.0]],
     }
 }

@@ -1,9 +1,11 @@
 //! The trials as points of the prior's unit cube, with the prior's terms there.
 
 use crate::optimize::ask::Direction;
+use crate::optimize::gp::regression::Observations;
+use crate::optimize::observations::{ObservedTrial, TrialPoints};
 use crate::optimize::prior::PriorModel;
 use crate::optimize::prior::terms::{Ensemble, Features};
-use crate::optimize::trial::{Trial, TrialState};
+use crate::optimize::trial::Trial;
 
 /// One finished jump.
 #[derive(Debug, Clone)]
@@ -21,7 +23,7 @@ pub struct Jump {
 }
 
 /// The trials that the model reads.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct History {
     /// Number of parameters.
     pub dimensions: usize,
@@ -37,32 +39,31 @@ impl History {
     /// Reads the trials that have all parameters of the prior.
     pub fn gather(prior: &PriorModel, ensemble: &Ensemble, trials: &[Trial], direction: Direction) -> History {
         let parameters = &prior.prior().parameters;
-        let mut history = History { dimensions: parameters.len(), ..History::default() };
-        for trial in trials {
-            let coordinates = parameters.iter().map(|p| trial.parameter(&p.name).map(|v| p.range.scale(v)));
-            let Some(point) = coordinates.collect::<Option<Vec<f64>>>() else { continue };
-            match (trial.state, trial.value) {
-                (TrialState::Running, _) => {
-                    let features = ensemble.features(prior.prior(), &point);
-                    history.pending.push((point, features));
-                }
-                (TrialState::Fail, _) => history.void.push(point),
-                (TrialState::Complete, Some(value)) if value.is_finite() && trial.violation() <= 0.0 => {
-                    let features = ensemble.features(prior.prior(), &point);
-                    let value = direction.maximized(value);
-                    let stood = !trial.is_fall();
-                    history.jumps.push(Jump { number: trial.number, point, features, stood, value });
-                }
-                _ => {}
-            }
-        }
-        // A point that was run again has a result: the interrupted trial leaves no trace.
-        let (jumps, pending) = (&history.jumps, &history.pending);
-        let again = |point: &Vec<f64>| {
-            jumps.iter().any(|jump| jump.point == *point) || pending.iter().any(|(other, _)| other == point)
+        let TrialPoints { observed, pending, void } = TrialPoints::of(trials, parameters, direction);
+        let features = |point: &[f64]| ensemble.features(prior.prior(), point);
+        let jump = |ObservedTrial { number, point, stood, value }: ObservedTrial| {
+            let features = features(&point);
+            Jump { number, point, features, stood, value }
         };
-        history.void.retain(|point| !again(point));
-        history
+        let running = |point: Vec<f64>| {
+            let features = features(&point);
+            (point, features)
+        };
+        History {
+            dimensions: parameters.len(),
+            jumps: observed.into_iter().map(jump).collect(),
+            pending: pending.into_iter().map(running).collect(),
+            void,
+        }
+    }
+
+    /// The jumps that stood as observations of a regression, in scaled values and with a row of terms each.
+    pub fn observations(&self, ensemble: &Ensemble, terms: Vec<Vec<f64>>) -> Observations {
+        Observations {
+            points: self.stood().map(|jump| jump.point.clone()).collect(),
+            terms,
+            values: self.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
+        }
     }
 
     /// The jumps without a fall.

@@ -37,7 +37,8 @@ pub struct PriorInsight {
     pub bias: MeanAndDeviation,
     /// The simulated robots in their order.
     pub worlds: Vec<WorldWeight>,
-    /// ln of the likelihood of the values with the simulated robots over that without them.
+    /// ln of the likelihood of the values with the simulated robots over that without them, each at its best hyperparameters and times
+    /// their prior.
     pub log_bayes_factor: f64,
     /// Whether the sampler uses the simulated values; see [`safeguard`].
     pub trusted: bool,

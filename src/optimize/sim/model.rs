@@ -13,7 +13,6 @@ use crate::optimize::gp::regression::{
 };
 use crate::optimize::prior::standing::LogisticPrior;
 use crate::optimize::prior::terms::{Ensemble, Features};
-use libm::log;
 use nalgebra::{DMatrix, DVector};
 
 /// Standard deviation of the bias b.
@@ -53,21 +52,14 @@ impl ValueModel {
         let mut linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, SCALE * SCALE] };
         linear.mean.extend(std::iter::repeat_n(0.0, r));
         linear.variance.extend(std::iter::repeat_n(COMPONENTS / r.max(1) as f64, r));
-        let observed = Observations {
-            points: history.stood().map(|jump| jump.point.clone()).collect(),
-            terms: history.stood().map(|jump| jump.features.value.clone()).collect(),
-            values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
-        };
+        let terms = history.stood().map(|jump| jump.features.value.clone()).collect();
+        let observed = history.observations(ensemble, terms);
         ValueModel::about(observed, linear, &hyper_prior(DELTA), history.dimensions)
     }
 
     /// Fits a model without prior: a constant of variance 1 and a signal of the prior's scale.
     pub fn without_prior(ensemble: &Ensemble, history: &History) -> Option<ValueModel> {
-        let observed = Observations {
-            points: history.stood().map(|jump| jump.point.clone()).collect(),
-            terms: history.stood().map(|_| vec![1.0]).collect(),
-            values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
-        };
+        let observed = history.observations(ensemble, history.stood().map(|_| vec![1.0]).collect());
         let linear = LinearPrior { mean: vec![0.0], variance: vec![1.0] };
         ValueModel::about(observed, linear, &hyper_prior(0.0), history.dimensions)
     }
@@ -76,11 +68,7 @@ impl ValueModel {
     /// median hyperparameters.
     pub fn log_likelihood_about(ensemble: &Ensemble, history: &History, simulated: &[f64]) -> f64 {
         let linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, 0.0] };
-        let observed = Observations {
-            points: history.stood().map(|jump| jump.point.clone()).collect(),
-            terms: simulated.iter().map(|value| vec![1.0, *value]).collect(),
-            values: history.stood().map(|jump| (jump.value - ensemble.offset) / ensemble.scale).collect(),
-        };
+        let observed = history.observations(ensemble, simulated.iter().map(|value| vec![1.0, *value]).collect());
         let theta = hyper_prior(DELTA).median(history.dimensions).to_log();
         let covariance = observed.linear_covariance(&linear);
         log_likelihood(&theta, &observed.points, &observed.residual(&linear), Some(&covariance)).0
@@ -148,11 +136,10 @@ fn fitted(observed: &Observations, linear: &LinearPrior, prior: &HyperPrior, d: 
 
 /// ln lengthscale ~ N(-0.35, 0.5^2), ln s^2 ~ N(`signal`, 1), ln sigma^2 ~ N(-6, 1.5^2)
 fn hyper_prior(signal: f64) -> HyperPrior {
-    let prior = |median, width, (low, high)| LogNormal { median, width, bounds: (log(low), log(high)) };
     HyperPrior {
-        lengthscale: prior(-0.35, 0.5, (0.05, 20.0)),
-        signal: prior(signal, 1.0, (1e-4, 20.0)),
-        noise: prior(-6.0, 1.5, (1e-6, 0.5)),
+        lengthscale: LogNormal::new(-0.35, 0.5, (0.05, 20.0)),
+        signal: LogNormal::new(signal, 1.0, (1e-4, 20.0)),
+        noise: LogNormal::new(-6.0, 1.5, (1e-6, 0.5)),
         // The medians, and rougher with more noise.
         starts: vec![[-0.35, signal, -6.0], [-1.15, signal, -4.5]],
     }

@@ -21,7 +21,8 @@ pub struct CheckedValue {
     pub value: ValueModel,
     /// Whether it is about the simulated robots.
     pub trusted: bool,
-    /// ln of the likelihood of the values with the simulated robots over that without them.
+    /// ln of the likelihood of the values with the simulated robots over that without them, each at its best hyperparameters and times
+    /// their prior.
     pub log_bayes_factor: f64,
 }
 

@@ -29,7 +29,7 @@ const LOCAL: u32 = 100;
 /// Best candidates around which the first local round searches.
 const CENTRES: usize = 4;
 
-/// PointPrediction at a point.
+/// Prediction at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct PointPrediction {
     /// Mean of the value, scaled.
@@ -54,7 +54,7 @@ pub struct Acquisition<'a> {
     incumbent: Option<f64>,
     /// J*, scaled and counted from [`Acquisition::origin`].
     star: f64,
-    /// The value of a fall, scaled: 0, or the lowest value of the worlds where values are negative.
+    /// The value of a fall, scaled: 0, or the lowest value of the worlds where that is negative, so that no jump that stands counts less.
     origin: f64,
     /// lambda 10^c for c falls in a row: price of a fall, as a share of J*.
     price: f64,
@@ -94,7 +94,7 @@ pub struct Scored {
     /// The point, in the prior's unit cube.
     pub point: Vec<f64>,
     score: Score,
-    /// PointPrediction there.
+    /// Prediction there.
     pub prediction: PointPrediction,
 }
 
