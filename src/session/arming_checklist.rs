@@ -113,6 +113,10 @@ impl ArmingChecklist {
             // A person may go to the robot now.
             self.confirmed.remove(ArmingCheck::AreaClear);
         }
+        if !from.commanded() && to.commanded() {
+            // Before, restarts and losses of the robot are not watched.
+            self.withdraw();
+        }
         if let TransitionCause::Fault(fault) = cause
             && fault.voids_confirmations()
         {

@@ -199,6 +199,25 @@ fn a_real_robot_is_not_armed_before_every_item_holds_and_the_refusal_names_all()
     assert_eq!(session.body.mode(), Mode::StandUp);
 }
 
+/// Regression: low-level mode could be confirmed while the robot was still off, or was switched off and on while it was only observed,
+/// when restarts are not watched; the list then showed it as confirmed.
+#[test]
+fn what_was_confirmed_before_control_is_taken_is_confirmed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::begin(Backend::Hardware, Some(folder.path().to_owned()), false);
+    session.ticks(10);
+    for check in OperatorCheck::ALL {
+        assert!(session.request(OperatorRequest::Confirm(check)).accepted);
+    }
+    assert!(!session.body.mode().commanded());
+    session.supervisor.take_control();
+    session.ticks(1500);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
+    assert_eq!(session.state(ArmingCheck::LowLevel), ArmingCheckState::Waiting);
+    assert_eq!(session.state(ArmingCheck::AreaClear), ArmingCheckState::Waiting);
+    assert_eq!(session.state(ArmingCheck::Configuration), ArmingCheckState::Passed);
+}
+
 /// The confirmation of a clear area holds for one arming: afterwards a person may have been at the robot.
 #[test]
 fn the_area_is_asked_about_before_each_arming() {

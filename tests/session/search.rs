@@ -534,6 +534,75 @@ fn the_verdict_that_ended_a_confirmation_can_be_undone() {
     assert_eq!(experiment.stage(), ExperimentStage::Finished);
 }
 
+/// Regression: after the undo the end of the session wrote the result of the confirmation all the same, and the next session repeated
+/// nothing more.
+#[test]
+fn a_confirmation_whose_last_verdict_was_taken_back_is_not_over_at_the_end_of_the_session() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    (0..5).for_each(|_| jump(&mut experiment, 0.0));
+    experiment.confirm_best(3).unwrap();
+    (0..3).for_each(|_| jump(&mut experiment, 0.0));
+    experiment.undo().unwrap();
+    experiment.close().unwrap();
+    let words = confirmation_in_words(&study_in(folder.path()), 0.95).expect("it runs");
+    assert!(words.ends_with("are repeated for the last time"), "{words}");
+    let mut again = open(folder.path());
+    again.judge(Verdict::Void, false).unwrap();
+    assert_eq!(again.proposal().unwrap().source, ProposalSource::Confirm);
+}
+
+/// Regression: without a verdict that could be taken back, a point that waited was fixed, and fixed one trial more than asked for.
+#[test]
+fn a_point_that_waits_when_a_parameter_is_fixed_uses_one_trial_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    jump(&mut experiment, 0.0);
+    experiment.enqueue(&[("f0".into(), 1.0)]).unwrap();
+    experiment.close().unwrap();
+    let mut experiment = open(folder.path());
+    experiment.fix("Fx", 60.0, 1).unwrap();
+    assert_eq!(accept(&mut experiment).jump.fx_n, 60.0);
+    assert_eq!(search(&mut experiment).parameters[1].fixed, None);
+    assert_ne!(value(&experiment, "Fx"), 60.0);
+}
+
+/// Regression: between approval and commit another program exchanged two points of the queue: one ran twice, the other never.
+#[test]
+fn an_approval_of_a_queued_point_sees_that_another_program_has_exchanged_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    [77.0, 78.0].map(|fx| experiment.enqueue(&[("Fx".into(), fx)]).unwrap());
+    let seen = experiment.proposal().unwrap();
+    assert_eq!((seen.trial, value(&experiment, "Fx")), (0, 77.0));
+    assert!(study_in(folder.path()).exchange_waiting(0, 1).unwrap());
+    let error = experiment.approve(seen.trial, seen.revision).unwrap_err();
+    assert!(matches!(error, RequestRefusal::Overtaken(0)), "{error}");
+    assert_eq!([accept(&mut experiment).jump.fx_n, accept(&mut experiment).jump.fx_n], [78.0, 77.0]);
+    // Nobody has approved it yet: the card changes by itself.
+    [79.0, 80.0].map(|fx| experiment.enqueue(&[("Fx".into(), fx)]).unwrap());
+    experiment.refresh().unwrap();
+    let first = experiment.proposal().unwrap().trial;
+    assert!(study_in(folder.path()).exchange_waiting(first, first + 1).unwrap());
+    experiment.refresh().unwrap();
+    assert_eq!(value(&experiment, "Fx"), 80.0);
+}
+
+/// Regression: a result that was first read between its judgement and its report, while the other program could still take it back,
+/// never changed the risk of a waiting proposal.
+#[test]
+fn a_result_that_another_program_could_still_take_back_counts_once_it_is_final() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut worker = joined(folder.path(), 20, Duration::from_secs(60));
+    let mut experiment = open(folder.path());
+    accept(&mut worker);
+    experiment.refresh().unwrap();
+    assert_eq!(experiment.proposal().unwrap().risk, None);
+    approve(&mut worker);
+    experiment.refresh().unwrap();
+    assert_eq!(experiment.proposal().unwrap().risk.map(|risk| risk.neighbours), Some(1));
+}
+
 #[test]
 fn a_proposal_comes_with_its_densities_and_what_matters() {
     let mut experiment = experiment(40);

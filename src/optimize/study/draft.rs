@@ -58,12 +58,19 @@ pub struct TrialDraft {
     pub after: Draws,
     /// Id of the enqueued trial.
     pub(super) waiting: Option<u64>,
+    /// The values with which it was queued: points of the queue change places.
+    pub(super) queued: Vec<(String, f64)>,
 }
 
 impl TrialDraft {
     /// The proposed values by name.
     pub fn point(&self) -> Vec<(String, f64)> {
         self.parameters.iter().map(|p| (p.name.clone(), p.value)).collect()
+    }
+
+    /// Whether `trial` was queued with the point of this draft: another program may have exchanged points of the queue.
+    pub fn is_of(&self, trial: &Trial) -> bool {
+        trial.fixed() == self.queued
     }
 }
 
@@ -103,6 +110,7 @@ impl Study {
             before,
             after: streams.draws(),
             waiting: waiting.map(|t| t.id),
+            queued: waiting.map(Trial::fixed).unwrap_or_default(),
         }
     }
 
@@ -130,8 +138,8 @@ impl Study {
 
     /// The draft with another waiting trial: for a trial that was queued in a fork and then in this study.
     pub fn redirected(&self, draft: &TrialDraft, waiting: u32) -> Result<TrialDraft, StudyError> {
-        let id = self.trial(waiting)?.id;
-        Ok(TrialDraft { number: waiting, waiting: Some(id), ..draft.clone() })
+        let trial = self.trial(waiting)?;
+        Ok(TrialDraft { number: waiting, waiting: Some(trial.id), queued: trial.fixed(), ..draft.clone() })
     }
 
     /// Begins the trial of a draft and records it as running. Values in `overrides` replace those of the draft and are
@@ -139,7 +147,7 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or another worker has begun the enqueued
-    /// trial; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is unchanged then.
+    /// trial or exchanged its point; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is unchanged then.
     pub fn begin(
         &mut self,
         draft: &TrialDraft,
@@ -176,10 +184,10 @@ impl Study {
                 return Err(StudyError::Full);
             }
             id = draft.waiting.unwrap_or(journal.next_trial_id());
-            let (waiting, now) = (journal.trial(id).map(|t| t.state), Some(Timestamp::now()));
+            let (waiting, now) = (journal.trial(id), Some(Timestamp::now()));
             let mut operations = match (draft.waiting, waiting) {
                 (None, _) => vec![Operation::CreateTrial { study, started: now, template: None }],
-                (_, Some(TrialState::Waiting)) => {
+                (_, Some(trial)) if trial.state == TrialState::Waiting && draft.is_of(trial) => {
                     vec![Operation::SetState { trial: id, state: TrialState::Running, values: None, at: now }]
                 }
                 _ => return Err(stale()),

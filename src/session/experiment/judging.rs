@@ -168,6 +168,7 @@ impl Experiment {
         // If this fails, the verdict stands on the disk and must still be reported.
         self.study.annotate(trial, &attributes::write(&JudgedAttributes::of(&row, false)))?;
         self.pending_verdict = None;
+        self.confirmation.reopen();
         self.confirmation.forget_report();
         self.rows.insert(trial, row);
         self.publish_row(trial);

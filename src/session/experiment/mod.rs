@@ -33,7 +33,7 @@ pub use self::proposal_start::next_seed;
 pub use self::readers::{best_of, judged, points_of_rows};
 pub use self::search::fixed_in_words;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use self::attributes::TrialAttributes;
@@ -87,6 +87,8 @@ pub struct Experiment {
     state: ExperimentState,
     /// Rows of the trial table, by number.
     rows: BTreeMap<u32, TrialRecord>,
+    /// Numbers of the rows of trials that other programs still ran when they were read.
+    running_elsewhere: BTreeSet<u32>,
     /// Number of open proposals and of their changes: the newest revision.
     revisions: u32,
     pending_verdict: Option<PendingVerdict>,
@@ -114,6 +116,7 @@ impl Experiment {
             study,
             state: ExperimentState::Finished,
             rows: BTreeMap::new(),
+            running_elsewhere: BTreeSet::new(),
             revisions: 0,
             pending_verdict: None,
             search: SearchSettings::default(),

@@ -109,6 +109,11 @@ impl OpenProposal {
         (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())
     }
 
+    /// Whether the waiting trial of `study` that it proposes has another point by now; false if it does not wait there.
+    pub fn is_exchanged_in(&self, study: &Study) -> bool {
+        self.waits_as().and_then(|number| study.trial(number).ok()).is_some_and(|trial| !self.draft.is_of(trial))
+    }
+
     /// Whether its point was queued, and not drafted by the sampler.
     pub fn is_queued(&self) -> bool {
         self.draft.enqueued

@@ -47,7 +47,7 @@ impl Experiment {
                 if full(&self.study) && !open.approved().is_beyond_budget() && full(&self.study_with_verdict()?) {
                     self.log("other workers have run the trials that were left".to_owned());
                     self.propose()?;
-                } else if next != open.waits_as() && !open.is_changed() {
+                } else if (next != open.waits_as() || open.is_exchanged_in(&self.study)) && !open.is_changed() {
                     self.warn("another program has changed the queue: another point is proposed".to_owned());
                     self.propose()?;
                 } else {
@@ -130,9 +130,15 @@ impl Experiment {
         for trial in self.study.trials() {
             let news = match self.rows.get(&trial.number) {
                 None => trial.state != TrialState::Waiting,
-                Some(row) => trial.state.is_finished() && row.verdict.is_none(),
+                // A verdict that the other program could still take back is in the row already.
+                Some(row) => {
+                    trial.state.is_finished() && (self.running_elsewhere.remove(&trial.number) || row.verdict.is_none())
+                }
             };
             if news {
+                if !trial.state.is_finished() {
+                    self.running_elsewhere.insert(trial.number);
+                }
                 let row = attributes::row_of(trial, self.study.note_of(trial.number), &self.plan.parameters);
                 self.outbox.push(Record::Trial(row.clone()));
                 self.rows.insert(trial.number, row);

@@ -282,11 +282,13 @@ impl Experiment {
         }
     }
 
-    /// Publishes the search and the model's predictions without a verdict that was taken back; `trial` waits for another.
+    /// Publishes search, points and the model's predictions without a verdict that was taken back; `trial` waits for another.
     pub fn publish_model(&mut self, trial: u32) {
         let study = self.study.fork();
         let model = study.predict();
         self.model_best = model.best;
+        self.hop_share = envelope::share(&self.plan, study.trials());
+        self.outbox.extend(self.confirmation.changed_points(&study).map(Record::Points));
         self.publish_search(&study);
         self.outbox.push(Record::Insight(ProposalInsight { trial, ..model_insight(&model) }));
     }

@@ -95,10 +95,11 @@ impl Experiment {
         if !free {
             return not_now(format!("with {name} fixed nothing would be left to search; queue the point instead"));
         }
-        let from = self
-            .pending_verdict
-            .as_ref()
-            .map_or(self.study.trials().len() as u32, |pending| pending.suggestion.trial + 1);
+        let after_verdict = self.pending_verdict.as_ref().map(|pending| pending.suggestion.trial + 1);
+        // A point that waits is fixed, too, if it was not queued with another value.
+        let queued = self.study.waiting().next().map(|trial| trial.number);
+        let next = self.study.trials().len() as u32;
+        let from = after_verdict.unwrap_or(next).min(queued.unwrap_or(next));
         self.search.fix(name, value, trials, from);
         self.write_search()
     }
