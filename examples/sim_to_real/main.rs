@@ -198,9 +198,8 @@ fn main() {
             let attainable = attainable(&mut jumper, noise, &of_all, &long);
             let again = noise + 2 * OPTIMUM_REPEATS;
             let best = attainable.long;
-            let mut reaches = |(point, value): &(Vec<_>, f64)| {
-                *value >= NEAR * best && jumper.repeated(point, again, OPTIMUM_REPEATS) >= REACHED * best
-            };
+            let mut reaches =
+                |(point, value): &(Vec<_>, f64)| *value >= NEAR * best && jumper.reaches(point, again, REACHED * best);
             let of_proposers = all().filter(|(job, _)| !job.is_long);
             let early = of_proposers.map(|(job, result)| (job.proposer, result.early.iter().any(&mut reaches)));
             let early: Vec<(Proposer, bool)> = early.collect();

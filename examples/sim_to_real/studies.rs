@@ -39,8 +39,8 @@ const SHORTLIST: usize = 10;
 pub(super) const OPTIMUM_REPEATS: u64 = 16;
 /// Share of the optimum that counts as reached.
 pub(super) const REACHED: f64 = 0.95;
-/// Share of it that the jump of a study must have had for its point to be repeated: saves the time of the hopeless ones.
-pub(super) const NEAR: f64 = 0.75;
+/// Share of it below which the jump of a study, and then a few repetitions, tell that its point is not worth more of them.
+pub(super) const NEAR: f64 = 0.8;
 
 /// Source of the jumps of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -148,6 +148,15 @@ impl<'a> Jumper<'a> {
     /// Mean of `count` jumps at a point, falls as 0.
     pub(super) fn repeated(&mut self, point: &[(String, f64)], seed: u64, count: u64) -> f64 {
         (0..count).map(|i| self.jump(point, seed + i).unwrap_or(0.0)).sum::<f64>() / count as f64
+    }
+
+    /// Whether the mean of [`OPTIMUM_REPEATS`] jumps at a point is `wanted` or more. A quarter of them with less than [`NEAR`] of it
+    /// decide already, which a single fall among four does.
+    pub(super) fn reaches(&mut self, point: &[(String, f64)], seed: u64, wanted: f64) -> bool {
+        let (few, all) = (OPTIMUM_REPEATS / 4, OPTIMUM_REPEATS);
+        let first = self.repeated(point, seed, few);
+        let mut rest = || self.repeated(point, seed + few, all - few);
+        first >= NEAR * wanted && (few as f64 * first + (all - few) as f64 * rest()) / all as f64 >= wanted
     }
 }
 
