@@ -472,6 +472,30 @@ fn every_source_of_tests_benches_and_examples_belongs_to_a_target() {
     assert_none(&lost, "Name it with `mod` in a file of a target, or as `path` of a [[test]] in ui/Cargo.toml.");
 }
 
+/// Functions of the C library have other bits on another machine; those of the crate libm have not, and `robot::rotation` has the
+/// rotations.
+#[test]
+fn jumps_and_proposals_use_no_function_of_the_c_library() {
+    let methods = "sin cos tan sin_cos asin acos atan atan2 sinh cosh tanh exp exp2 exp_m1 ln ln_1p log10 log2 powf hypot cbrt mul_add \
+                   euler_angles scaled_axis";
+    let calls = methods.split_whitespace().map(|method| format!(".{method}("));
+    let rotations = ["from_scaled_axis", "from_axis_angle", "from_euler_angles", "new_eps"];
+    let calls: Vec<String> = calls.chain(rotations.map(|name| format!("UnitQuaternion::{name}("))).collect();
+    let mut violations = Vec::new();
+    for folder in ["robot", "sim", "control", "session", "optimize", "telemetry", "trial"] {
+        // The sine of the lanes is their own.
+        let sources =
+            files(&root().join("src").join(folder), "rs").into_iter().filter(|file| !file.ends_with("sim/lanes.rs"));
+        for file in sources {
+            let text = fs::read_to_string(&file).unwrap();
+            let called = |line: &str| calls.iter().find(|call| line.contains(*call));
+            let lines = text.lines().enumerate().filter_map(|(i, line)| Some((i, called(line.split("//").next()?)?)));
+            violations.extend(lines.map(|(i, call)| format!("{}:{}: {call})", short(&file), i + 1)));
+        }
+    }
+    assert_none(&violations, "Call the crate libm, or a function of `robot::rotation`.");
+}
+
 #[test]
 fn no_file_is_longer_than_500_lines() {
     let mut violations = Vec::new();

@@ -45,7 +45,7 @@ impl Oscillator {
 /// Force of the profile that a foot exerts, leg frame, N:
 /// F = `[Fx Fy Fz]` sin(theta) if sin(theta) < 0, else 0.
 pub fn force_leg(amplitude_leg: &Vector3<f64>, theta_rad: f64) -> Vector3<f64> {
-    amplitude_leg * theta_rad.sin().min(0.0)
+    amplitude_leg * libm::sin(theta_rad).min(0.0)
 }
 
 /// Returns the amplitude across the direction of `task`: optional, and the only one that may be negative. `Fx` is positive

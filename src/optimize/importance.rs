@@ -86,7 +86,7 @@ fn density(counts: &[f64; GRID]) -> [f64; GRID] {
     let squares: f64 = used.iter().map(|(x, n)| (x - mean) * (x - mean) * n).sum();
     let deviation = (squares / (total - 1.0).max(1.0)).sqrt();
     // Scott's rule with the interquartile range: 1.059 min(IQR / 1.34, s) n^(-1/5)
-    let width = 1.059 * (quartile_range(&used, total) / 1.34).min(deviation) * total.powf(-0.2);
+    let width = 1.059 * (quartile_range(&used, total) / 1.34).min(deviation) * libm::pow(total, -0.2);
     let width = width.max(NARROWEST);
     let kernels = used.iter().map(|&(x, n)| (x, width, n));
     let prior = ((GRID - 1) as f64 / 2.0, GRID as f64, 1.0);

@@ -214,8 +214,8 @@ pub fn rank(contenders: &[RepeatedPoint], direction: Direction) -> Ranking {
 /// (Abramowitz and Stegun, 26.7.3 and 26.7.4).
 pub fn student_cdf(t: f64, freedom: usize) -> f64 {
     let n = freedom as f64;
-    let theta = (t / n.sqrt()).atan();
-    let (sin, cos) = theta.sin_cos();
+    let theta = libm::atan(t / n.sqrt());
+    let (sin, cos) = libm::sincos(theta);
     // A(t|n), the mass of (-t, t), as a sum of powers of cos theta
     let powers = |first: f64, start: usize| {
         let mut term = first;

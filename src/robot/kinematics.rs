@@ -4,6 +4,7 @@
 //! a = l2 cos q2 + l3 cos(q2 + q3);  x = -l2 sin q2 - l3 sin(q2 + q3);
 //! y = s l1 cos q1 + a sin q1;  z = s l1 sin q1 - a cos q1.
 
+use libm::{acos, atan2, sincos};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Joints, Leg};
@@ -42,9 +43,9 @@ impl LegGeometry {
     /// Returns foot position and Jacobian at the joint angles `q` (hip, thigh, calf; rad) of a leg on `side` (+1 left,
     /// -1 right).
     pub fn foot(&self, q: &Vector3<f64>, side: f64) -> FootPosition {
-        let (s1, c1) = q.x.sin_cos();
-        let (s2, c2) = q.y.sin_cos();
-        let (s23, c23) = (q.y + q.z).sin_cos();
+        let (s1, c1) = sincos(q.x);
+        let (s2, c2) = sincos(q.y);
+        let (s23, c23) = sincos(q.y + q.z);
         let l1 = side * self.abduction;
         // In the plane of the leg the foot is a below and w behind the thigh joint.
         let a = self.thigh * c2 + self.calf * c23;
@@ -77,7 +78,7 @@ impl LegGeometry {
         let a = a_squared.sqrt();
         let l1 = side * self.abduction;
         // (y, z) is (l1, -a) turned by q1 about x.
-        let hip = z.atan2(y) - (-a).atan2(l1);
+        let hip = atan2(z, y) - atan2(-a, l1);
         let hip = (hip + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         // Cosine rule at the knee.
         let (l2, l3) = (self.thigh, self.calf);
@@ -89,9 +90,10 @@ impl LegGeometry {
         if cos_calf < -1.0 {
             return Err(unreachable("nearer than the folded leg"));
         }
-        let calf = -cos_calf.acos();
+        let calf = -acos(cos_calf);
         // (-x, a) = (l2 sin q2 + l3 sin(q2+q3), l2 cos q2 + l3 cos(q2+q3)).
-        let thigh = (-x).atan2(a) - (l3 * calf.sin()).atan2(l2 + l3 * calf.cos());
+        let (calf_sin, calf_cos) = sincos(calf);
+        let thigh = atan2(-x, a) - atan2(l3 * calf_sin, l2 + l3 * calf_cos);
         Ok(Vector3::new(hip, thigh, calf))
     }
 

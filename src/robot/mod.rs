@@ -14,6 +14,7 @@ pub mod kinematics;
 pub mod link_settings;
 pub mod recent_count;
 pub mod remote;
+pub mod rotation;
 pub mod servo_grace;
 pub mod state_counter;
 

@@ -32,7 +32,7 @@ pub fn effort(ticks: &[Tick]) -> Option<JumpEffort> {
     let mut effort = JumpEffort::default();
     if end > start {
         let velocity = ticks[start].estimate.velocity_world;
-        effort.takeoff_angle_rad = velocity.z.atan2(velocity.xy().norm());
+        effort.takeoff_angle_rad = libm::atan2(velocity.z, velocity.xy().norm());
         effort.takeoff_speed_m_s = velocity.norm();
     }
     for (index, tick) in ticks.iter().enumerate() {

@@ -1,8 +1,9 @@
 //! Measurement and objective of a jump: pure functions of the trial's recorded ticks, so that a replay computes the same.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 use crate::control::foot_placement::SHORTEST_FLIGHT_S;
+use crate::robot::rotation::about_z;
 use crate::robot::{CONTROL_PERIOD_S, ticks_in};
 use crate::telemetry::{Fault, Phase, Tick, TrialEnd};
 use crate::trial::{BounceRule, Displacement, JumpRow, MeasuredJump, ObjectiveRule, Task, TrialRecord, Verdict};
@@ -26,7 +27,7 @@ pub fn measure(rule: &ObjectiveRule, ticks: &[Tick]) -> Option<MeasuredJump> {
     let ticks = &ticks[first..];
     let start = &ticks[0].estimate;
     let yaw_init = start.roll_pitch_yaw.z;
-    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_init);
+    let turn = about_z(-yaw_init);
     let displacement = |tick: &Tick| {
         let moved = turn * (tick.estimate.position_world - start.position_world);
         let dyaw_rad = tick.estimate.roll_pitch_yaw.z - yaw_init;
@@ -200,7 +201,7 @@ fn jumps(
 /// Angle between the trunk's and the world's z axis, rad.
 pub fn tilt_rad(tick: &Tick) -> f64 {
     let up_world = tick.estimate.world_from_body * Vector3::z();
-    up_world.z.clamp(-1.0, 1.0).acos()
+    libm::acos(up_world.z.clamp(-1.0, 1.0))
 }
 
 /// Returns the suggested verdict with its reason. A robot that bounced on has a cause of its own under a rule other than

@@ -66,7 +66,7 @@ impl Actuator {
     fn drive_hardware_like(&mut self, command: &JointCommand, q: &Joints, dq: &Joints, h: f64) -> MotorTorques {
         let HardwareLikeConfig { torque_lag_s, dry_friction_nm, viscous_friction_nm_s, .. } = self.config.hardware_like;
         // First-order lag: d torque / dt = (wanted - torque) / T, exactly over the step.
-        let reached = if torque_lag_s > 0.0 { -(-h / torque_lag_s).exp_m1() } else { 1.0 };
+        let reached = if torque_lag_s > 0.0 { -libm::expm1(-h / torque_lag_s) } else { 1.0 };
         let mut drive = MotorTorques {
             torque: [0.0; JOINTS],
             damping: [viscous_friction_nm_s; JOINTS],

@@ -20,6 +20,7 @@ use super::dynamics::Dynamics;
 use super::model::RobotModel;
 use super::spatial::{SpatialForce, SpatialMotion};
 use super::state::{Acceleration, SimState};
+use crate::robot::rotation::from_scaled_axis;
 use crate::robot::{GRAVITY, JOINTS, Joints};
 
 /// Values that a flight step leaves for the next one.
@@ -52,9 +53,8 @@ pub(super) fn flight_step(
     let (angular, turn) = (&state.angular_velocity_body, &start.angular_body);
     // Magnus: h w + h^2 w' / 2 + h^3 w'' / 6 + h^3 (w x w') / 12
     let rotation = angular * h + turn * square + growth.angular_body * sixth + angular.cross(turn) * (h * square / 6.0);
-    let world_from_body = UnitQuaternion::new_normalize(
-        state.world_from_body.quaternion() * UnitQuaternion::from_scaled_axis(rotation).quaternion(),
-    );
+    let world_from_body =
+        UnitQuaternion::new_normalize(state.world_from_body.quaternion() * from_scaled_axis(rotation).quaternion());
     let predicted = SimState {
         position_world: state.position_world,
         world_from_body,

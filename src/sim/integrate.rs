@@ -6,6 +6,7 @@ use super::motion::GeneralizedVelocity;
 use super::six::{split, stack};
 use super::state::{Acceleration, SimState};
 use crate::robot::JOINTS;
+use crate::robot::rotation::from_scaled_axis;
 
 /// Returns the velocity without contact at the end of a step of `h` seconds, in the axes of the body at its start.
 pub(super) fn free_velocity(state: &SimState, acceleration: &Acceleration, h: f64) -> GeneralizedVelocity {
@@ -25,7 +26,7 @@ pub(super) fn free_velocity(state: &SimState, acceleration: &Acceleration, h: f6
 pub(super) fn semi_implicit_euler(state: &mut SimState, velocity: &GeneralizedVelocity, h: f64) {
     let (linear, angular) = split(&velocity.trunk);
     // p' = p + h R v,  R' = R exp(h w),  v' = exp(h w)^T v
-    let turn = UnitQuaternion::from_scaled_axis(angular * h);
+    let turn = from_scaled_axis(angular * h);
     state.position_world += state.world_from_body * (linear * h);
     state.world_from_body = UnitQuaternion::new_normalize(state.world_from_body.quaternion() * turn.quaternion());
     state.velocity_body = turn.inverse_transform_vector(&linear);

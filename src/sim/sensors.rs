@@ -1,13 +1,14 @@
 //! Sensor errors: noise and bias of the inertial unit, encoder steps, resolution of the foot forces, delay. Drawn once
 //! per control period from the trial's seed.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::config::SensorConfig;
 use crate::robot::RobotState;
+use crate::robot::rotation::from_scaled_axis;
 
 /// Longest delay, ms.
 pub(super) const MAX_DELAY: usize = 20;
@@ -76,7 +77,7 @@ impl Sensors {
         // Ornstein-Uhlenbeck: e' = e (1 - dt/T) + sigma sqrt(2 dt/T) n keeps the standard deviation sigma.
         let share = 1.0 / ORIENTATION_DRIFT_MS;
         self.tilt = self.tilt * (1.0 - share) + self.normal(config.orientation_noise_rad * (2.0 * share).sqrt());
-        state.imu.world_from_body *= UnitQuaternion::from_scaled_axis(self.tilt);
+        state.imu.world_from_body *= from_scaled_axis(self.tilt);
         for q in &mut state.joint_position_rad {
             *q = rounded(*q, config.encoder_step_rad);
         }
@@ -91,8 +92,9 @@ impl Sensors {
     }
 
     fn sample(&mut self, deviation: f64) -> f64 {
-        let n: f64 = StandardNormal.sample(&mut self.random);
-        deviation * n
+        // In single precision: in the tails the logarithm of the C library counts, whose last bit is not that of every machine.
+        let n: f32 = StandardNormal.sample(&mut self.random);
+        deviation * f64::from(n)
     }
 
     fn normal(&mut self, deviation: f64) -> Vector3<f64> {

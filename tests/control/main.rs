@@ -25,6 +25,7 @@ mod landing;
 mod landing_terms;
 mod mode;
 mod readiness;
+mod rotation;
 mod series;
 mod standing;
 mod warm_up;

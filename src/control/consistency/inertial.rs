@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::inputs::StateStep;
 use super::leaky::kept;
+use crate::robot::rotation::{angle_between, scaled_axis};
 use crate::robot::{GRAVITY, Imu};
 
 /// Time constant of the averaged accelerometer at rest, s.
@@ -68,7 +69,7 @@ impl InertialUnit {
         if step.is_short {
             // d(R^T z)/dt = -omega x R^T z.
             self.up_body -= turned.cross(&self.up_body);
-            let reported = (last.world_from_body.inverse() * now.world_from_body).scaled_axis();
+            let reported = scaled_axis(&(last.world_from_body.inverse() * now.world_from_body));
             self.turn_error = self.turn_error * kept(step.dt_s, TURN_S) + reported - turned;
         } else {
             let reported = last.world_from_body.inverse() * now.world_from_body;
@@ -94,12 +95,12 @@ impl InertialUnit {
 
     /// Angle from the averaged specific force to the orientation's upward direction.
     pub fn resting_tilt_error_rad(&self) -> f64 {
-        self.accel_body.angle(&self.reported_up_body)
+        angle_between(&self.accel_body, &self.reported_up_body)
     }
 
     /// Angle from the upward direction by gyroscope and accelerometer to that of the orientation.
     pub fn tilt_error_rad(&self) -> f64 {
-        self.up_body.angle(&self.reported_up_body)
+        angle_between(&self.up_body, &self.reported_up_body)
     }
 
     pub fn turn_error_rad(&self) -> f64 {

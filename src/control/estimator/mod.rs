@@ -18,6 +18,7 @@ pub use filter::{Filter, FootOdometry};
 use super::command_gate;
 use super::settings::{ControlSettings, ObjectiveSource};
 use crate::robot::kinematics::FootPosition;
+use crate::robot::rotation::roll_pitch_yaw;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
 use crate::telemetry::Estimate;
 
@@ -65,7 +66,7 @@ impl Estimator {
         }
         let estimate = &mut self.estimate;
         estimate.foot_position_leg = feet.map(|foot| foot.position_leg);
-        let (roll, pitch, yaw) = estimate.world_from_body.euler_angles();
+        let (roll, pitch, yaw) = roll_pitch_yaw(&estimate.world_from_body);
         // Unwrap: the yaw nearest to the previous one, so that a turn of more than pi counts in full.
         let turn = yaw - previous_yaw;
         let unwrapped = if self.started {
@@ -149,7 +150,7 @@ fn foot_motions(state: &RobotState, feet: &PerLeg<FootPosition>, settings: &Cont
         let offset_body = settings.hip_origin_body[leg] + feet[leg].position_leg - settings.imu_origin_body;
         let velocity_body = gyro_body.cross(&offset_body) + feet[leg].jacobian_leg * dq;
         // The calf turns about the hip's x axis and about the y axis that the hip has turned by q1.
-        let (s1, c1) = q.x.sin_cos();
+        let (s1, c1) = libm::sincos(q.x);
         let swing = dq.y + dq.z;
         let calf_rate_world = rotation * (gyro_body + Vector3::new(dq.x, c1 * swing, s1 * swing));
         FootOdometry {

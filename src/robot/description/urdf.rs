@@ -3,12 +3,13 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
 
 use super::urdf_checks;
 use super::{CollisionShape, DescriptionError, JointLimits, LegDescription, LinkFrame, RigidBody};
 use crate::robot::kinematics::LegGeometry;
+use crate::robot::rotation::from_roll_pitch_yaw;
 use crate::robot::{JOINT_NAMES, JOINTS, Joints, Leg, PerLeg};
 
 /// Contents of a URDF.
@@ -404,6 +405,6 @@ fn vector(xyz: &[f64; 3]) -> Vector3<f64> {
 /// Converts a URDF pose: roll, pitch, yaw about fixed axes, then the translation.
 fn isometry(pose: &Pose) -> Isometry3<f64> {
     let [roll, pitch, yaw] = pose.rpy.0;
-    let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    let rotation = from_roll_pitch_yaw(roll, pitch, yaw);
     Isometry3::from_parts(Translation3::from(vector(&pose.xyz.0)), rotation)
 }

@@ -12,6 +12,7 @@ use super::packet::{
     CommandError, CrcForm, LowCmd, LowState, MODE_BRAKE, MODE_SERVO, MotorRecord, MotorTarget, POSITION_STOP,
     RemoteRecord, VELOCITY_STOP,
 };
+use crate::robot::rotation::roll_pitch_yaw;
 use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
 
 /// Largest deviation of the norm of a reported orientation from 1.
@@ -110,7 +111,7 @@ pub fn low_state(state: &RobotState, foot_step_n: f64) -> LowState {
     datagram.imu.quaternion = [w, x, y, z].map(float);
     datagram.imu.gyroscope = floats(&state.imu.gyro_body);
     datagram.imu.accelerometer = floats(&state.imu.accel_body);
-    let (roll, pitch, yaw) = orientation.euler_angles();
+    let (roll, pitch, yaw) = roll_pitch_yaw(orientation);
     datagram.imu.roll_pitch_yaw = [roll, pitch, yaw].map(float);
     for i in 0..JOINTS {
         let motor = &mut datagram.motor[i];

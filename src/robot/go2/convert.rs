@@ -12,6 +12,7 @@ use super::message::{
     StateMessage, VELOCITY_STOP,
 };
 use crate::robot::remote::RemoteRecord;
+use crate::robot::rotation::roll_pitch_yaw;
 use crate::robot::{Battery, Imu, JOINTS, JointCommand, MotorCommand, RobotState};
 
 /// Largest deviation of the norm of a reported orientation from 1.
@@ -107,7 +108,7 @@ pub fn low_state(state: &RobotState, foot_step_n: f64) -> StateMessage {
     message.tick = state.robot_time_ms;
     let orientation = &state.imu.world_from_body;
     let [x, y, z, w]: [f64; 4] = orientation.coords.into();
-    let (roll, pitch, yaw) = orientation.euler_angles();
+    let (roll, pitch, yaw) = roll_pitch_yaw(orientation);
     message.imu.quaternion = [w, x, y, z].map(|value| value as f32);
     message.imu.gyroscope = floats(&state.imu.gyro_body);
     message.imu.accelerometer = floats(&state.imu.accel_body);

@@ -80,7 +80,7 @@ impl ContactSolver {
     /// Starts a step of `h` seconds.
     pub fn start(&mut self, h: f64) {
         self.clear();
-        self.kept_slip = if self.slip_time_s > 0.0 { (-h / self.slip_time_s).exp() } else { 0.0 };
+        self.kept_slip = if self.slip_time_s > 0.0 { libm::exp(-h / self.slip_time_s) } else { 0.0 };
     }
 
     fn clear(&mut self) {

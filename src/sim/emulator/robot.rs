@@ -4,6 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::robot::description::RobotDescription;
 use crate::robot::remote::{Remote, RemoteButtons};
+use crate::robot::rotation::from_scaled_axis;
 use crate::robot::{
     Battery, CONTROL_PERIOD_S, Imu, JOINTS, JointCommand, Joints, LEGS, MotorCommand, Placement, Robot, RobotState,
     Truth,
@@ -165,7 +166,7 @@ impl EmulatedRobot {
         replace(&mut state.joint_position_rad, &self.defects.angle);
         replace(&mut state.joint_velocity_rad_s, &self.defects.speed);
         replace(&mut state.joint_torque_n_m, &self.defects.torque);
-        state.imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.defects.tilt_rad);
+        state.imu.world_from_body *= from_scaled_axis(Vector3::x() * self.defects.tilt_rad);
         let [flips_roll, flips_pitch] = self.defects.flipped.map(|flipped| if flipped { -1.0 } else { 1.0 });
         let [x, y, z, w]: [f64; 4] = state.imu.world_from_body.coords.into();
         let reported = Quaternion::new(w, flips_roll * x, flips_pitch * y, z);
@@ -187,7 +188,7 @@ impl EmulatedRobot {
         let sign = if self.time_ms.is_multiple_of(2) { 1.0 } else { -1.0 };
         imu.gyro_body.z += sign * IMU_NOISE;
         imu.accel_body.z += sign * IMU_NOISE;
-        imu.world_from_body *= UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sign * IMU_NOISE);
+        imu.world_from_body *= from_scaled_axis(Vector3::z() * (sign * IMU_NOISE));
     }
 
     fn battery(&self, state: &RobotState) -> Battery {

@@ -70,8 +70,8 @@ impl Terrain {
     /// The ground of `config` in a trial with seed 0.
     pub fn new(config: &TerrainConfig) -> Terrain {
         let angle = if config.kind == TerrainKind::Slope { config.slope.angle_rad } else { 0.0 };
-        let (sin, cos) = angle.sin_cos();
-        let (heading_sin, heading_cos) = config.slope.heading_rad.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
+        let (heading_sin, heading_cos) = libm::sincos(config.slope.heading_rad);
         let normal = Vector3::new(-sin * heading_cos, -sin * heading_sin, cos);
         let (capacity, grid) = match config.kind {
             TerrainKind::Flat | TerrainKind::Slope => (0, BlockGrid::new([0.0; 4], 1.0, 0)),
@@ -145,7 +145,7 @@ impl Terrain {
             tries += 1;
             let center = Vector2::new(uniform(x_from, x_to), uniform(y_from, y_to));
             let half = Vector2::new(uniform(edge_m[0], edge_m[1]), uniform(edge_m[0], edge_m[1])) / 2.0;
-            let (sin, cos) = uniform(0.0, std::f64::consts::PI).sin_cos();
+            let (sin, cos) = libm::sincos(uniform(0.0, std::f64::consts::PI));
             let mut block = TerrainBlock::new(center, half, Vector2::new(cos, sin), friction);
             // A block lies on the highest one below it; a block that would be too high is drawn again.
             let mut under = 0.0_f64;
