@@ -572,7 +572,9 @@ fn a_point_that_waits_when_a_parameter_is_fixed_uses_one_trial_up() {
 fn an_approval_of_a_queued_point_sees_that_another_program_has_exchanged_it() {
     let folder = tempfile::tempdir().unwrap();
     let mut experiment = open(folder.path());
-    [77.0, 78.0].map(|fx| experiment.enqueue(&[("Fx".into(), fx)]).unwrap());
+    for fx in [77.0, 78.0] {
+        experiment.enqueue(&[("Fx".into(), fx)]).unwrap();
+    }
     let seen = experiment.proposal().unwrap();
     assert_eq!((seen.trial, value(&experiment, "Fx")), (0, 77.0));
     assert!(study_in(folder.path()).exchange_waiting(0, 1).unwrap());
@@ -580,7 +582,9 @@ fn an_approval_of_a_queued_point_sees_that_another_program_has_exchanged_it() {
     assert!(matches!(error, RequestRefusal::Overtaken(0)), "{error}");
     assert_eq!([accept(&mut experiment).jump.fx_n, accept(&mut experiment).jump.fx_n], [78.0, 77.0]);
     // Nobody has approved it yet: the card changes by itself.
-    [79.0, 80.0].map(|fx| experiment.enqueue(&[("Fx".into(), fx)]).unwrap());
+    for fx in [79.0, 80.0] {
+        experiment.enqueue(&[("Fx".into(), fx)]).unwrap();
+    }
     experiment.refresh().unwrap();
     let first = experiment.proposal().unwrap().trial;
     assert!(study_in(folder.path()).exchange_waiting(first, first + 1).unwrap());
