@@ -9,8 +9,8 @@
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
 //! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`attainable`]): the largest of many noisy values would be
 //! too high. Two shares of the studies are printed: those whose best trial after 1, 3 or 5 jumps has 95 % of this optimum, the best of
-//! all studies on the robot, and those that stood in one of five jumps at a point with 95 % of what 100 jumps find ([`studies::Attainable`]).
-//! Standard error says how far the work is.
+//! all studies on the robot, and those that stood in one of five jumps at a point with 95 % of what 100 jumps find
+//! ([`studies::Attainable`]). Standard error says how far the work is.
 
 mod statistics;
 mod studies;

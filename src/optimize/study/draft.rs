@@ -147,7 +147,8 @@ impl Study {
     ///
     /// # Errors
     /// [`StudyError::StaleDraft`] if another trial has begun from the same streams, or another worker has begun the enqueued
-    /// trial or exchanged its point; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is unchanged then.
+    /// trial or exchanged its point; [`StudyError::UnknownParameter`] or [`StudyError::Value`] for an override. The study is
+    /// unchanged then.
     pub fn begin(
         &mut self,
         draft: &TrialDraft,
