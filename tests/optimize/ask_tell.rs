@@ -140,7 +140,7 @@ fn falls_and_voids_are_told_and_errors_change_nothing() {
     assert_eq!(answer(&mut served, r#"{"ask":{}}"#)["number"], json!(3));
 }
 
-/// Regression: a result of a point that was queued and not asked for yet was refused as told before.
+/// Regression: the result of a queued point, for which nobody had asked, was refused with "told before".
 #[test]
 fn a_result_of_a_queued_point_asks_for_the_point_first() {
     let mut queued = study(SamplerKind::Gp);

@@ -13,12 +13,11 @@ use quadfrog::optimize::prior::{Prior, PriorModel, World};
 use quadfrog::optimize::sobol::Sobol;
 use quadfrog::optimize::space::{Parameter, Range};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
-use quadfrog::optimize::trial::TrialState;
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, import};
 use quadfrog::telemetry::TrialEnd;
 use quadfrog::trial::{ExperimentStage, ProposalInsight, Verdict};
-use support::{approve, far, plan, ticks};
+use support::{approve, far, imported, plan, ticks};
 
 fn study(kind: SamplerKind, storage: Storage) -> Study {
     let options = support::study(Storage::Memory).options().clone();
@@ -76,18 +75,6 @@ fn an_override_changes_the_expectation() {
     assert_ne!(after.expected.unwrap().value, before.expected.unwrap().value);
     run(&mut experiment, 1, &[]);
     assert_eq!(experiment.row(after.trial).unwrap().expected, after.expected);
-}
-
-fn imported(values: [f64; 3], value: f64) -> TableTrial {
-    TableTrial {
-        state: TrialState::Complete,
-        value: Some(value),
-        parameters: ["f0", "Fx", "Fz"].map(str::to_owned).into_iter().zip(values).collect(),
-        attributes: serde_json::Map::new(),
-        started: None,
-        completed: None,
-        note: String::new(),
-    }
 }
 
 /// Regression: a waiting proposal went on to say what had been expected of it before another program added results.

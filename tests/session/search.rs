@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::insight::IMPORTANCE_TRIALS;
-use quadfrog::optimize::trial::TrialState;
 use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{
     Experiment, RequestRefusal, confirmation_in_words, fixed_in_words, import, judged, points_of_rows, rows_of,
@@ -16,7 +14,7 @@ use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{
     ExperimentStage, FixedParameter, PointRecord, Proposal, ProposalInsight, ProposalSource, SearchStatus, Verdict,
 };
-use support::{accept, approve, experiment, far, joined, open, plan, run, skip, study_in, ticks};
+use support::{accept, approve, experiment, far, imported, joined, open, plan, run, skip, study_in, ticks};
 
 #[derive(Default)]
 struct News {
@@ -718,16 +716,7 @@ fn the_risk_of_a_waiting_proposal_is_that_of_the_results_that_another_program_ad
     let mut experiment = open(folder.path());
     let before = experiment.proposal().unwrap();
     assert_eq!(before.risk, None);
-    let row = |f0: f64, value| TableTrial {
-        state: TrialState::Complete,
-        value: Some(value),
-        parameters: vec![("f0".into(), f0), ("Fx".into(), 100.0), ("Fz".into(), 240.0)],
-        attributes: serde_json::Map::new(),
-        started: None,
-        completed: None,
-        note: String::new(),
-    };
-    let table = [1.0, 1.1, 1.2, 1.3, 1.4].map(|f0| row(f0, 0.1 * f0));
+    let table = [1.0, 1.1, 1.2, 1.3, 1.4].map(|f0| imported([f0, 100.0, 240.0], 0.1 * f0));
     import(&mut study_in(folder.path()), table.into()).unwrap();
     experiment.take_records();
     experiment.refresh().unwrap();

@@ -6,9 +6,11 @@ use std::time::Duration;
 
 use quadfrog::control::settings::TaskControl;
 use quadfrog::optimize::ask::{Direction, SamplerConfig};
+use quadfrog::optimize::exchange::TableTrial;
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Storage, Study, StudyOptions};
+use quadfrog::optimize::trial::TrialState;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{Cutoff, Tick, TrialEnd, TrialSpec};
 use quadfrog::trial::{Backend, BounceRule, ExperimentStage, ParameterInfo, Task, Verdict};
@@ -130,6 +132,19 @@ pub fn accept(experiment: &mut Experiment) -> TrialSpec {
 
 pub fn parameters(experiment: &Experiment) -> Vec<f64> {
     experiment.proposal().unwrap().parameters.iter().map(|p| p.value).collect()
+}
+
+/// Returns a row of a table to import: a trial that stood, with values of [`BOUNDS`] and its objective.
+pub fn imported(values: [f64; 3], value: f64) -> TableTrial {
+    TableTrial {
+        state: TrialState::Complete,
+        value: Some(value),
+        parameters: BOUNDS.map(|(name, ..)| name.to_owned()).into_iter().zip(values).collect(),
+        attributes: serde_json::Map::new(),
+        started: None,
+        completed: None,
+        note: String::new(),
+    }
 }
 
 /// Returns the study in `folder`, as another program reads it.
