@@ -89,6 +89,8 @@ const CONTROL_HARDWARE: &[Row] = &[
 
 const SAFETY: &[Row] = &[
     (&["consistency.repeated_states"], within!(10, 200, "states")),
+    (&["pre_arm.motor_measured_c"], within!(-20, 10, "degrees Celsius")),
+    (&["consistency.repeated_motor_states"], within!(5, 100, "states")),
     // Gravity is 9.81.
     (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], within!(0.1, 3, "m/s^2")),
     // A robot tips beyond.
@@ -217,6 +219,7 @@ const SAFETY_HARDWARE: &[Row] = &[
     (&["ready.tilt_rad"], within!(0.02, 0.35, "rad")),
     (&["ready.stance_rad"], within!(0.05, 0.5, "rad")),
     (&["watchdog.suspended_ms"], within!(20, 200, "ms")),
+    (&["remote.silent_ms"], within!(500, 10_000, "ms")),
     (&["watchdog.guard_silent_ms"], within!(30, 500, "ms")),
     (&["watchdog.hardware_idle_s"], within!(5, 600, "s")),
     (&["parameters.f0", "parameters.f1"], within!(0.1, 5, "Hz")),

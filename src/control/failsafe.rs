@@ -6,8 +6,8 @@
 use super::consistency::FOREIGN_COMMANDS;
 use super::failsafe_causes::{
     body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
-    joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_stop,
-    robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
+    joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_silent,
+    remote_stop, robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
 };
 pub use super::failsafe_inputs::{FailsafeInputs, MotionPhase, PeriodWatch};
 use super::settings::ControlSettings;
@@ -90,7 +90,7 @@ const SIT_DOWN: [FailsafeAction; 3] = [FailsafeAction::Land; 3];
 
 /// The table, by precedence: of the rows that trip the strictest action counts, of equal ones the first row. A cause that makes
 /// measured numbers invalid stands above the rows that compare them.
-const TABLE: [FailsafeRow; 24] = [
+const TABLE: [FailsafeRow; 25] = [
     row(
         "stop buttons of the remote",
         |_| "pressed together (`[remote]`)".to_owned(),
@@ -266,6 +266,13 @@ const TABLE: [FailsafeRow; 24] = [
         Mode::energised,
         SIT_DOWN,
     ),
+    row(
+        "remote silent",
+        |s| format!("no answer for {} s, where one is needed, on hardware", f64::from(s.remote.silent_ms) * 1e-3),
+        remote_silent,
+        Mode::energised,
+        SIT_DOWN,
+    ),
 ];
 
 /// One row of the table in words.
@@ -330,7 +337,8 @@ impl PeriodWatch {
 ///
 /// 1. Battery below its limit.
 /// 2. A motor at its warm limit.
-/// 3. Delay of the link, `delay_growth_ms`, above its limit.
+/// 3. A remote control that is needed and silent.
+/// 4. Delay of the link, `delay_growth_ms`, above its limit.
 pub fn trial_inhibit(state: &RobotState, delay_growth_ms: f64, settings: &ControlSettings) -> Option<TrialInhibit> {
     let limits = &settings.failsafe;
     let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
@@ -340,6 +348,9 @@ pub fn trial_inhibit(state: &RobotState, delay_growth_ms: f64, settings: &Contro
     let (joint, measured_c) = hottest(state);
     if measured_c >= limits.motor_warm_c {
         return Some(TrialInhibit::MotorWarm { joint, measured_c, allowed_c: limits.motor_warm_c });
+    }
+    if settings.misses_remote(state) {
+        return Some(TrialInhibit::RemoteSilent);
     }
     let delayed = settings.hardware && delay_growth_ms > limits.delay_hold_ms;
     delayed.then_some(TrialInhibit::LinkDelay { measured_ms: delay_growth_ms, allowed_ms: limits.delay_hold_ms })

@@ -15,6 +15,11 @@ pub(super) fn remote_stop(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &C
     pressed.then_some(Fault::RemoteStop)
 }
 
+pub(super) fn remote_silent(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
+    let (silent_ms, allowed_ms) = (inputs.remote_silent_ms, settings.remote.silent_ms);
+    (silent_ms > allowed_ms).then_some(Fault::RemoteSilent { silent_ms, allowed_ms })
+}
+
 pub(super) fn robot_clock(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
     inputs.consistency.clock_fault(&settings.consistency)
 }

@@ -40,6 +40,8 @@ pub struct FailsafeInputs<'a> {
     pub suspended_ms: u32,
     /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
     pub guard_silent_ms: u32,
+    /// Time for which the remote control has not answered, ms; zero where none is needed.
+    pub remote_silent_ms: u32,
 }
 
 /// Phase of the motion, on which the action of a failsafe depends.

@@ -76,8 +76,8 @@ fn inhibit_key(inhibit: &TrialInhibit, settings: &ControlSettings) -> Option<Key
         TrialInhibit::StatesLost { .. } => ("pre_arm.loss_share", settings.arming.loss_share),
         TrialInhibit::TicksLate { .. } => ("pre_arm.late_share", settings.arming.late_share),
         TrialInhibit::LinkDelay { .. } => ("watchdog.delay_hold_ms", limits.delay_hold_ms),
-        // Its time is a key of another file.
-        TrialInhibit::FeetUp { .. } | TrialInhibit::NotQuiet { .. } => return None,
+        // No number, or a number of another file.
+        TrialInhibit::RemoteSilent | TrialInhibit::FeetUp { .. } | TrialInhibit::NotQuiet { .. } => return None,
     })
 }
 
@@ -107,6 +107,7 @@ fn fault_key(fault: &Fault, settings: &ControlSettings) -> Option<KeyValue> {
         Fault::OtherCommander { sign: CommanderSign::ForeignTorque, .. } => {
             ("consistency.torque_n_m", settings.consistency.torque_n_m)
         }
+        Fault::RemoteSilent { .. } => ("remote.silent_ms", settings.remote.silent_ms.into()),
         Fault::Suspended { .. } => ("watchdog.suspended_ms", limits.suspended_ms.into()),
         Fault::GuardSilent { .. } => ("watchdog.guard_silent_ms", limits.guard_silent_ms.into()),
         Fault::LinkDelay { .. } => ("watchdog.delay_land_ms", limits.delay_land_ms),
@@ -135,5 +136,6 @@ const fn sensor_key(check: SensorCheck) -> &'static str {
         SensorCheck::FeetInFreeFall => "consistency.free_fall_contact_s",
         SensorCheck::FeetAfterLanding => "consistency.unsupported_s",
         SensorCheck::JointVelocity => "consistency.joint_velocity_rad",
+        SensorCheck::MotorsLive => "consistency.repeated_motor_states",
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub use super::task_control::TaskControl;
 use crate::robot::kinematics::LegGeometry;
 use crate::robot::remote::RemoteButtons;
-use crate::robot::{Joints, LEGS, PerLeg};
+use crate::robot::{Joints, LEGS, PerLeg, RobotState};
 use crate::telemetry::{Estimate, SensorCheck};
 use crate::trial::Gains;
 
@@ -113,6 +113,8 @@ pub struct ArmingLimits {
     pub battery_percent: f64,
     /// Hottest motor, degrees Celsius.
     pub motor_c: f64,
+    /// Least temperature of a motor that counts as measured, degrees Celsius.
+    pub motor_measured_c: f64,
     /// Largest angular velocity of a still robot, rad/s.
     pub gyro_rad_s: f64,
     /// Time for which the robot must be still, s.
@@ -153,6 +155,8 @@ pub struct ReadyLimits {
 pub struct ConsistencyLimits {
     /// Most states in a row with the same measurement of the inertial unit.
     pub repeated_states: u32,
+    /// Most states in a row with the same measurements of a motor while the robot jumps.
+    pub repeated_motor_states: u32,
     /// Largest deviation of the averaged specific force from gravity while standing, m/s^2.
     pub gravity_m_s2: f64,
     /// Largest angle from the orientation's upward direction to that of gyroscope and accelerometer, rad.
@@ -193,6 +197,7 @@ impl ConsistencyLimits {
             SensorCheck::FeetInFreeFall => self.free_fall_contact_s,
             SensorCheck::FeetAfterLanding => self.unsupported_s,
             SensorCheck::JointVelocity => self.joint_velocity_rad,
+            SensorCheck::MotorsLive => self.repeated_motor_states.into(),
         }
     }
 }
@@ -203,8 +208,10 @@ impl ConsistencyLimits {
 pub struct RemoteSettings {
     /// Buttons that damp the robot when they are pressed together.
     pub stop: RemoteButtons,
-    /// Whether arming needs a remote control that answers.
+    /// Whether arming and jumping need a remote control that answers.
     pub needed: bool,
+    /// Longest silence of a remote control that is needed, ms: LAND.
+    pub silent_ms: u32,
 }
 
 /// Expiry of an approval.
@@ -423,4 +430,11 @@ pub struct ControlSettings {
     pub late_ms: f64,
     /// Longest wait in READY or REVIEW, s; zero disables the limit.
     pub idle_s: f64,
+}
+
+impl ControlSettings {
+    /// Whether the robot needs a remote control, and it does not answer.
+    pub fn misses_remote(&self, state: &RobotState) -> bool {
+        self.hardware && self.remote.needed && state.remote.is_none()
+    }
 }

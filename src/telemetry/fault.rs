@@ -73,6 +73,10 @@ pub enum Fault {
     OtherCommander { sign: CommanderSign, measured: f64, allowed: f64 },
     #[error("stop buttons of the remote control pressed")]
     RemoteStop,
+    #[error(
+        "the remote control does not answer for {silent_ms} ms, limit {allowed_ms} ms: nobody beside the robot can stop it"
+    )]
+    RemoteSilent { silent_ms: u32, allowed_ms: u32 },
     /// Time is that by which CLOCK_BOOTTIME ran ahead of CLOCK_MONOTONIC.
     #[error("the computer was suspended for {suspended_ms} ms, limit {allowed_ms} ms")]
     Suspended { suspended_ms: u32, allowed_ms: u32 },
@@ -110,6 +114,8 @@ pub enum SensorCheck {
     FeetAfterLanding,
     #[strum(serialize = "joint velocity")]
     JointVelocity,
+    #[strum(serialize = "motors live")]
+    MotorsLive,
 }
 
 impl SensorCheck {
@@ -124,7 +130,7 @@ impl SensorCheck {
     /// Unit of the measured value.
     pub const fn unit(self) -> &'static str {
         match self {
-            SensorCheck::InertialUnitLive => "repeated states",
+            SensorCheck::InertialUnitLive | SensorCheck::MotorsLive => "repeated states",
             SensorCheck::GravityMagnitude => "m/s^2",
             SensorCheck::Orientation | SensorCheck::TurnRate | SensorCheck::JointVelocity => "rad",
             SensorCheck::FeetLoaded | SensorCheck::FeetInFreeFall | SensorCheck::FeetAfterLanding => "s",
@@ -133,7 +139,7 @@ impl SensorCheck {
 
     /// Decimals of the measured value.
     const fn digits(self) -> usize {
-        if matches!(self, SensorCheck::InertialUnitLive) { 0 } else { 3 }
+        if matches!(self, SensorCheck::InertialUnitLive | SensorCheck::MotorsLive) { 0 } else { 3 }
     }
 
     /// The sensors to check.
@@ -147,6 +153,7 @@ impl SensorCheck {
                 "the foot sensors and foot_force_n"
             }
             SensorCheck::JointVelocity => "the joint's encoder",
+            SensorCheck::MotorsLive => "the legs' cables and motor boards",
         }
     }
 }
@@ -220,6 +227,8 @@ pub enum TrialInhibit {
     BatteryLow { measured_percent: f64, allowed_percent: f64 },
     #[error("motor {} at {measured_c:.0} degrees Celsius, a jump needs less than {allowed_c:.0}; sit down and wait", joint_name(*.joint as usize))]
     MotorWarm { joint: u8, measured_c: f64, allowed_c: f64 },
+    #[error("the remote control does not answer, a jump needs it; switch it on and bring it in reach")]
+    RemoteSilent,
     #[error("{down} of 4 feet on the ground, a jump needs all; check stance and foot sensors")]
     FeetUp { down: u8 },
     #[error(

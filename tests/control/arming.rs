@@ -57,7 +57,7 @@ fn a_sound_robot_is_armed() {
 #[test]
 fn each_check_refuses_arming_by_itself() {
     type Breaks = fn(&mut ArmingBench);
-    let table: [(ArmingCheck, Breaks); 17] = [
+    let table: [(ArmingCheck, Breaks); 20] = [
         (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::NoNewState { age_ms: 12 })),
         (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
         (ArmingCheck::Checksums, |b| b.robot.link.recent_corrupt = 1),
@@ -86,6 +86,10 @@ fn each_check_refuses_arming_by_itself() {
         }),
         (ArmingCheck::Remote, |b| b.state().remote = None),
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[3] = f64::NAN),
+        // Motors that do not measure: an empty field, all of them, and a byte that reads as negative.
+        (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[3] = 0.0),
+        (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c = [0.0; 12]),
+        (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[5] = -1.0),
         (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
     ];
     for (check, breaks) in table {

@@ -12,7 +12,7 @@ use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, Ro
 use quadfrog::sim::emulator::Emulator;
 use quadfrog::sim::{ActuatorKind, BodyKind, TerrainKind};
 use quadfrog::telemetry::{
-    ArmingCheck, Command, CommandRefusal, Event, Fault, Mode, SensorCheck, TransitionCause, TrialSpec,
+    ArmingCheck, Command, CommandRefusal, Event, Fault, Mode, SensorCheck, TransitionCause, TrialInhibit, TrialSpec,
 };
 use quadfrog::trial::{Backend, JumpParameters, Task};
 use rand_chacha::ChaCha8Rng;
@@ -300,7 +300,7 @@ type Row = (&'static str, Mode, u32, &'static [&'static str]);
 
 const TURNS: &[&str] = &["orientation against gyroscope", "turn against gyroscope"];
 const CLOCK: &[&str] = &["the robot's clock is off"];
-const DAMPED: [Row; 22] = [
+const DAMPED: [Row; 23] = [
     ("imu-freeze", Mode::StandUp, 60, &["inertial unit live"]),
     ("imu-freeze", Mode::Ready, 60, &["inertial unit live"]),
     ("imu-freeze", Mode::Jump, 60, &["inertial unit live"]),
@@ -322,6 +322,7 @@ const DAMPED: [Row; 22] = [
     ("commander 50", Mode::Ready, 300, &["another program commands the robot"]),
     ("commander 50", Mode::Jump, 300, &["another program commands the robot"]),
     ("hidden-commander 100", Mode::Ready, 300, &["another program commands the robot: a torque"]),
+    ("motor-freeze FR_calf", Mode::Jump, 25, &["motors live"]),
     ("remote L2+B", Mode::Jump, 2, &["stop buttons of the remote control"]),
 ];
 
@@ -360,6 +361,52 @@ fn the_remote_stops_the_robot() {
         bench.command(Command::Acknowledge { stops: 0 });
         assert_eq!(bench.cycle.mode(), Mode::Disarmed);
     }
+}
+
+/// A leg whose measurements stand still since before the jump: they agree with the standing robot.
+#[test]
+fn a_motor_that_repeats_its_measurements_ends_the_jump_at_its_beginning() {
+    let mut bench = in_mode(Mode::Ready);
+    bench.inject("motor-freeze RL_thigh");
+    bench.ticks(1000);
+    assert_eq!(bench.cycle.mode(), Mode::Ready, "{:?}", bench.events);
+    bench.command(bench.approved());
+    let began = bench.ticks_in_mode(Mode::Ready, 10) + bench.ticks_in_mode(Mode::Countdown, 5000);
+    let ms = bench.ticks_in_mode(Mode::Jump, 1000);
+    println!("countdown after {began} ms, damped {ms} ms after its end");
+    assert!(ms <= 22 && bench.cycle.mode() == Mode::Fault, "{ms} ms: {:?}", bench.events);
+}
+
+/// A remote that falls silent after arming: no jump, and the robot sits down.
+#[test]
+fn without_a_remote_no_jump_begins_and_the_robot_sits_down() {
+    let mut bench = in_mode(Mode::Ready);
+    bench.settle();
+    bench.inject("remote-off");
+    bench.ticks(3);
+    bench.command(bench.approved());
+    assert_eq!(bench.refusal(), Some(CommandRefusal::Inhibited(TrialInhibit::RemoteSilent)));
+    let ms = 3 + bench.ticks_in_mode(Mode::Ready, 5000);
+    assert!((3000..3010).contains(&ms) && bench.cycle.mode() == Mode::SitDown, "{ms} ms: {:?}", bench.events);
+    bench.until(Mode::Disarmed);
+    // Until the gyroscope has been still for a second.
+    bench.ticks(1500);
+    assert_eq!((bench.faults(), bench.failing()), (Vec::new(), vec![ArmingCheck::Remote]));
+
+    let mut bench = in_mode(Mode::Countdown);
+    bench.inject("remote-off");
+    let ms = bench.ticks_in_mode(Mode::Countdown, 5000);
+    let cancelled = TransitionCause::NotReady(TrialInhibit::RemoteSilent);
+    assert!(
+        bench.events.iter().any(|event| matches!(event, Event::Mode { cause, .. } if *cause == cancelled)),
+        "{ms} ms"
+    );
+
+    // A jump lands, and the robot sits down once the silence has lasted.
+    let mut bench = in_mode(Mode::Jump);
+    bench.inject("remote-off");
+    bench.until(Mode::Disarmed);
+    assert_eq!(bench.faults(), []);
 }
 
 /// One of the two buttons, or others, do nothing.

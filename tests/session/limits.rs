@@ -222,6 +222,7 @@ fn ends(settings: &ControlSettings) -> Vec<TrialEnd> {
         Fault::OtherCommander { sign: CommanderSign::ForeignTorque, measured, allowed },
         Fault::Suspended { suspended_ms: 60, allowed_ms: 50 },
         Fault::GuardSilent { silent_ms: 80, allowed_ms: 70 },
+        Fault::RemoteSilent { silent_ms: 3001, allowed_ms: 3000 },
         Fault::LinkDelay { measured_ms, allowed_ms },
         Fault::FollowingError { joint, measured_rad, allowed_rad },
         Fault::RampTorque { joint, measured_nm: 50.0, allowed_nm: 40.0 },

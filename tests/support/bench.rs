@@ -107,6 +107,16 @@ impl<R: Robot> Bench<R> {
         panic!("never {mode:?}; last {:?}: {:?}", self.cycle.mode(), self.events.last());
     }
 
+    /// Ticks until another mode, at most `most`; returns their number.
+    pub fn ticks_in_mode(&mut self, mode: Mode, most: u32) -> u32 {
+        for n in 1..=most {
+            if self.tick(None).mode != mode {
+                return n;
+            }
+        }
+        panic!("still {mode:?} after {most} ms: {:?}", self.events.last());
+    }
+
     /// Ticks until `mode`; returns the modes on the way.
     pub fn modes_until(&mut self, mode: Mode) -> Vec<Mode> {
         let mut modes = vec![self.cycle.mode()];

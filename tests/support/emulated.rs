@@ -89,14 +89,4 @@ impl EmulatedBench {
         }
         *self.cycle.last()
     }
-
-    /// Ticks until another mode, at most `most`; returns their number.
-    pub fn ticks_in_mode(&mut self, mode: Mode, most: u32) -> u32 {
-        for n in 1..=most {
-            if self.tick(None).mode != mode {
-                return n;
-            }
-        }
-        panic!("still {mode:?} after {most} ms: {:?}", self.events.last());
-    }
 }

@@ -1,4 +1,4 @@
-//! Joint velocities against differentiated joint angles.
+//! Joint velocities against differentiated joint angles, and motors that repeat their measurements.
 
 use super::inputs::StateStep;
 use super::leaky::kept;
@@ -12,6 +12,8 @@ const SUM_S: f64 = 0.1;
 pub(super) struct JointRates {
     /// Change of the angle less the integral of the velocity, rad.
     error_rad: Joints,
+    /// States in a row with the same angle, velocity and torque.
+    repeated: [u32; JOINTS],
 }
 
 impl JointRates {
@@ -21,7 +23,17 @@ impl JointRates {
             let reported = 0.5 * (last.joint_velocity_rad_s[joint] + now.joint_velocity_rad_s[joint]) * step.dt_s;
             let added = if step.is_short { moved - reported } else { 0.0 };
             self.error_rad[joint] = self.error_rad[joint] * kept(step.dt_s, SUM_S) + added;
+            let measured = |state: &RobotState| {
+                [state.joint_position_rad, state.joint_velocity_rad_s, state.joint_torque_n_m]
+                    .map(|values| values[joint])
+            };
+            let same = measured(last) == measured(now);
+            self.repeated[joint] = if same { self.repeated[joint].saturating_add(1) } else { 0 };
         }
+    }
+
+    pub fn repeated_states(&self) -> u32 {
+        self.repeated.into_iter().max().unwrap_or(0)
     }
 
     /// Index and error of the joint with the largest error, rad.

@@ -92,6 +92,7 @@ impl Consistency {
             SensorCheck::FeetInFreeFall => self.feet.contact_in_free_fall_s(),
             SensorCheck::FeetAfterLanding => self.feet.unsupported_s(),
             SensorCheck::JointVelocity => self.joints.worst().1,
+            SensorCheck::MotorsLive => self.joints.repeated_states().into(),
         }
     }
 
@@ -139,6 +140,8 @@ impl Consistency {
 /// Whether the failsafe table watches a check in a mode.
 const fn watched(check: SensorCheck, mode: Mode) -> bool {
     match check {
+        // A motor of a standing robot may rest.
+        SensorCheck::MotorsLive => matches!(mode, Mode::Jump),
         SensorCheck::GravityMagnitude | SensorCheck::FeetLoaded => matches!(mode, Mode::Ready | Mode::Countdown),
         SensorCheck::FeetAfterLanding => matches!(mode, Mode::Jump | Mode::Settle | Mode::Review),
         SensorCheck::InertialUnitLive

@@ -38,6 +38,7 @@ impl Cycle {
             consistency: &self.consistency,
             suspended_ms: inputs.suspended_ms,
             guard_silent_ms: inputs.guard_silent_ms,
+            remote_silent_ms: self.remote_silent_ms,
         };
         let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {

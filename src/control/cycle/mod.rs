@@ -106,6 +106,8 @@ pub struct Cycle {
     ended: Option<RunningTrial>,
     feet: PerLeg<FootPosition>,
     state_age_ms: u32,
+    /// Time for which a remote control that is needed has not answered, ms.
+    remote_silent_ms: u32,
     /// `errno` of the last failed send; taken by the failsafes of the next tick.
     send_error: Option<i32>,
     /// Fault during a jump after which the robot sits down once it has landed.
@@ -153,6 +155,7 @@ impl Cycle {
             ended: None,
             feet: PerLeg::default(),
             state_age_ms: 0,
+            remote_silent_ms: 0,
             send_error: None,
             landing: None,
             fault_landing: None,
@@ -284,6 +287,8 @@ impl Cycle {
             Err(RobotError::NoNewState { age_ms }) => self.state_age_ms = age_ms,
             Err(RobotError::Send { errno }) => self.send_error = Some(errno),
         }
+        let silent = self.settings.misses_remote(&self.tick.state);
+        self.remote_silent_ms = if silent { self.remote_silent_ms.saturating_add(1) } else { 0 };
     }
 
     /// Measures the quality of the link with the state of this tick.

@@ -53,6 +53,8 @@ pub enum EmulatorFault {
     StateDelay(f64),
     /// The inertial unit repeats its last measurement.
     ImuFreeze,
+    /// A motor repeats its last angle, velocity and torque.
+    MotorFreeze { joint: usize },
     /// The reported orientation has the wrong sign of roll.
     FlipRoll,
     /// The reported orientation has the wrong sign of pitch.
@@ -88,7 +90,7 @@ enum FaultOperands {
 use FaultOperands::{Buttons, Joint, JointNumber, Number, Plain};
 
 /// Name, operands and description of every fault, for the parser and `help`.
-const FAULTS: [(&str, FaultOperands, &str); 31] = {
+const FAULTS: [(&str, FaultOperands, &str); 32] = {
     use EmulatorFault::*;
     [
         ("loss", Number(Loss, "PERCENT", 0.0, 100.0), "the network loses this share of the datagrams, each way"),
@@ -127,6 +129,7 @@ const FAULTS: [(&str, FaultOperands, &str); 31] = {
         ("delay-commands", Number(CommandDelay, "MS", 0.0, 1000.0), "only commands are delayed by this time"),
         ("delay-states", Number(StateDelay, "MS", 0.0, 1000.0), "only states are delayed by this time"),
         ("imu-freeze", Plain(ImuFreeze), "the inertial unit repeats its last measurement"),
+        ("motor-freeze", Joint(|joint| MotorFreeze { joint }), "a motor repeats its last angle, velocity and torque"),
         ("flip-roll", Plain(FlipRoll), "the reported orientation has the wrong sign of roll"),
         ("flip-pitch", Plain(FlipPitch), "the reported orientation has the wrong sign of pitch"),
         ("feet", Number(Feet, "N", 0.0, 500.0), "every foot sensor reports this force; 0: stuck up, 33: stuck down"),

@@ -271,6 +271,7 @@ impl Emulator {
             EmulatorFault::HiddenCommander(percent) => {
                 self.second = Some(SecondCommander { share: percent / 100.0, takes_states: false });
             }
+            EmulatorFault::MotorFreeze { joint } => defects.motor_frozen[joint] = true,
             EmulatorFault::Remote(buttons) => defects.remote_buttons = buttons,
             EmulatorFault::RemoteOff => defects.remote_off = true,
             EmulatorFault::Clear => {

@@ -37,6 +37,7 @@ pub(super) struct RobotDefects {
     pub torque: [Option<f64>; JOINTS],
     pub tilt_rad: f64,
     pub imu_frozen: bool,
+    pub motor_frozen: [bool; JOINTS],
     /// Wrong sign of roll and of pitch.
     pub flipped: [bool; 2],
     pub foot_force_n: Option<f64>,
@@ -60,8 +61,9 @@ pub(super) struct EmulatedRobot {
     /// Command of each motor; none if it brakes.
     pub motors: [Option<MotorCommand>; JOINTS],
     last_state: Option<RobotState>,
-    /// The last reported measurement of the inertial unit.
+    /// The last reported measurements of the inertial unit and of the motors: angle, velocity and torque.
     last_imu: Imu,
+    last_motors: [Joints; 3],
     /// Fraction of a millisecond by which the robot's clock is ahead.
     clock_ahead_ms: f64,
 }
@@ -79,6 +81,7 @@ impl EmulatedRobot {
             motors: [None; JOINTS],
             last_state: None,
             last_imu: Imu::default(),
+            last_motors: Default::default(),
             clock_ahead_ms: 0.0,
         };
         robot.lay_down();
@@ -166,6 +169,13 @@ impl EmulatedRobot {
         replace(&mut state.joint_position_rad, &self.defects.angle);
         replace(&mut state.joint_velocity_rad_s, &self.defects.speed);
         replace(&mut state.joint_torque_n_m, &self.defects.torque);
+        let measured = [&mut state.joint_position_rad, &mut state.joint_velocity_rad_s, &mut state.joint_torque_n_m];
+        for (values, last) in measured.into_iter().zip(&mut self.last_motors) {
+            for joint in (0..JOINTS).filter(|&joint| self.defects.motor_frozen[joint]) {
+                values[joint] = last[joint];
+            }
+            *last = *values;
+        }
         state.imu.world_from_body *= from_scaled_axis(Vector3::x() * self.defects.tilt_rad);
         let [flips_roll, flips_pitch] = self.defects.flipped.map(|flipped| if flipped { -1.0 } else { 1.0 });
         let [x, y, z, w]: [f64; 4] = state.imu.world_from_body.coords.into();
