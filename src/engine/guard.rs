@@ -54,6 +54,8 @@ const LEAST_DAMPING: f32 = 1.0;
 /// State of the guard process as the engine sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardState {
+    /// It has not answered yet.
+    Starting,
     /// It answers the heartbeats.
     Answering,
     /// It does not answer: it is stopped, or has no processor time.
@@ -66,6 +68,8 @@ pub enum GuardState {
 #[derive(Debug, Default)]
 struct GuardFindings {
     broken: AtomicBool,
+    /// It has answered once.
+    answered: AtomicBool,
     silent_ms: AtomicU32,
 }
 
@@ -88,8 +92,6 @@ pub struct GuardHeartbeat {
     ticks: u32,
     /// Ticks since the last answer that were followed by a heartbeat.
     silent_ms: u32,
-    /// Whether the guard has answered yet.
-    answered: bool,
 }
 
 /// Orders to the guard; on the connection as JSON, after its length in bytes (two bytes, little endian).
@@ -143,6 +145,8 @@ impl Guard {
             GuardState::Gone
         } else if self.findings.silent_ms.load(Ordering::Acquire) > self.allowed_silent_ms {
             GuardState::Silent
+        } else if !self.findings.answered.load(Ordering::Acquire) {
+            GuardState::Starting
         } else {
             GuardState::Answering
         }
@@ -164,7 +168,7 @@ impl GuardHeartbeat {
     pub fn new(connection: UnixStream) -> std::io::Result<GuardHeartbeat> {
         connection.set_nonblocking(true)?;
         let findings = Arc::default();
-        Ok(GuardHeartbeat { connection, findings, commanded: false, ticks: 0, silent_ms: 0, answered: false })
+        Ok(GuardHeartbeat { connection, findings, commanded: false, ticks: 0, silent_ms: 0 })
     }
 
     /// Counts a tick, or a datagram that is sent without one, and sends a heartbeat when it is due. Returns the time for
@@ -185,7 +189,11 @@ impl GuardHeartbeat {
 
     /// Time without an answer, ms; the time that a guard needs to start is not counted.
     fn reported_ms(&self) -> u32 {
-        if self.answered || self.silent_ms > LONGEST_START_MS { self.silent_ms } else { 0 }
+        if self.findings.answered.load(Ordering::Relaxed) || self.silent_ms > LONGEST_START_MS {
+            self.silent_ms
+        } else {
+            0
+        }
     }
 
     /// Takes the answers to the heartbeats before. Ticks are counted, not the time: a control thread that was delayed
@@ -194,7 +202,10 @@ impl GuardHeartbeat {
         let mut answers = [0; 64];
         match self.connection.read(&mut answers) {
             Ok(0) => self.findings.broken.store(true, Ordering::Release),
-            Ok(_) => (self.silent_ms, self.answered) = (0, true),
+            Ok(_) => {
+                self.silent_ms = 0;
+                self.findings.answered.store(true, Ordering::Release);
+            }
             Err(_) => self.silent_ms = self.silent_ms.saturating_add(self.ticks),
         }
         self.findings.silent_ms.store(self.reported_ms(), Ordering::Release);

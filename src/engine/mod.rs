@@ -51,6 +51,7 @@ use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::scheduling::set_priority;
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, INHIBITOR, SleepLock};
 use crate::realtime::system::descriptors;
+use crate::recording::disk::FreeSpace;
 use crate::recording::live::{LiveServer, LiveStatus};
 use crate::recording::record::{LogLevel, Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
@@ -123,7 +124,9 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let scheduled = threads.spawn_control((robot, guard_heartbeat), control_end, &options, &settings, clock)?;
 
     let recorded_in = recording.as_ref().and(options.folder.clone());
-    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), recorded_in)
+    let space =
+        recorded_in.map(FreeSpace::watch).transpose().map_err(EngineError::not_started("thread for the disk"))?;
+    let checklist = ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), space)
         .with_unseen_connection(options.unseen_connection.clone())
         .with_low_level(options.network.as_ref().map_or("none in the simulator", Network::low_level));
     let approval = settings.approval;

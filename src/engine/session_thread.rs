@@ -38,7 +38,10 @@ pub fn run(
     clock: &MonotonicClock,
     hardware: bool,
 ) -> (Supervisor, Option<Guard>) {
-    let mut guard_state = GuardState::Answering;
+    let mut guard_state = GuardState::Starting;
+    if guard.is_some() {
+        supervisor.await_guard();
+    }
     loop {
         // Before the trial that an observer has stopped is measured.
         for (level, message) in news.try_iter() {

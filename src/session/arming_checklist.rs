@@ -1,11 +1,9 @@
 //! The arming checklist: findings of the control thread, checks of the session, confirmations of the operator.
 
-use std::path::PathBuf;
-
 use crate::control::arming::{self, Sentence};
 use crate::control::settings::{ArmingLimits, ControlSettings};
 use crate::realtime::scheduling::{DeniedSetting, RealtimeSetting};
-use crate::recording::disk;
+use crate::recording::disk::FreeSpace;
 use crate::recording::record::ArmingCheckRecord;
 use crate::recording::recorder::RecorderStatus;
 use crate::telemetry::{ArmingCheck, ArmingCheckSet, ArmingCheckState, ArmingFindings, Mode, TransitionCause};
@@ -29,8 +27,8 @@ pub struct ArmingChecklist {
     hardware: bool,
     /// Fingerprint of the configuration.
     configuration: String,
-    /// Folder of the recording; none where nothing is kept.
-    folder: Option<PathBuf>,
+    /// Free space in the folder of the recording; none where nothing is kept.
+    space: Option<FreeSpace>,
     /// Checks that the operator has confirmed.
     confirmed: ArmingCheckSet,
     /// Time of the last confirmation of the clear area, ns.
@@ -49,15 +47,15 @@ pub struct ArmingChecklist {
 }
 
 impl ArmingChecklist {
-    /// A list without confirmations. `configuration` is the fingerprint for the operator; `folder` is the folder of the
+    /// A list without confirmations. `configuration` is the fingerprint for the operator; `space` is that of the folder of the
     /// recording, none where nothing is kept.
-    pub fn new(settings: &ControlSettings, configuration: String, folder: Option<PathBuf>) -> ArmingChecklist {
+    pub fn new(settings: &ControlSettings, configuration: String, space: Option<FreeSpace>) -> ArmingChecklist {
         ArmingChecklist {
             limits: settings.arming,
             trial_mb: settings.failsafe.disk_free_mb,
             hardware: settings.hardware,
             configuration,
-            folder,
+            space,
             confirmed: ArmingCheckSet::EMPTY,
             area_ns: 0,
             reboots: 0,
@@ -181,17 +179,20 @@ impl ArmingChecklist {
         found.chain(own).collect()
     }
 
-    /// Returns the reason if the disk is too full for another trial.
+    /// Returns the reason if the disk is too full for another trial, or it is not known whether it is.
     pub fn disk_low(&self) -> Option<String> {
-        let free = disk::free_mb(self.folder.as_ref()?).ok()?;
         let needed = u64::from(self.trial_mb);
-        (free < needed).then(|| {
-            format!("{free} MB free in the recording's folder, a trial needs at least {needed}; free some space")
-        })
+        match self.space.as_ref()?.mb() {
+            Ok(free) if free >= needed => None,
+            Ok(free) => Some(format!(
+                "{free} MB free in the recording's folder, a trial needs at least {needed}; free some space"
+            )),
+            Err(error) => Some(format!("the free space in the recording's folder is not known: {error}")),
+        }
     }
 
     fn recorder(&self, status: &RecorderStatus) -> ArmingCheckRecord {
-        let (state, found) = match (status.incomplete(), &self.folder) {
+        let (state, found) = match (status.incomplete(), &self.space) {
             (Some(error), _) => (ArmingCheckState::Failed, error.to_owned()),
             (None, Some(_)) if status.finished => (ArmingCheckState::Failed, "has ended".to_owned()),
             (None, Some(_)) => (ArmingCheckState::Passed, "recording".to_owned()),
@@ -204,14 +205,14 @@ impl ArmingChecklist {
 
     fn disk(&self) -> ArmingCheckRecord {
         let needed = format!("at least {} MB", self.limits.disk_free_mb);
-        let (state, found) = match &self.folder {
+        let (state, found) = match &self.space {
             None => (ArmingCheckState::NotNeeded, "no recording requested".to_owned()),
-            Some(folder) => match disk::free_mb(folder) {
+            Some(space) => match space.mb() {
                 Ok(free) if free >= u64::from(self.limits.disk_free_mb) => {
                     (ArmingCheckState::Passed, format!("{free} MB"))
                 }
                 Ok(free) => (ArmingCheckState::Failed, format!("{free} MB")),
-                Err(error) => (ArmingCheckState::Failed, error.to_string()),
+                Err(error) => (ArmingCheckState::Failed, error),
             },
         };
         self.item(ArmingCheck::Disk, state, found, needed)

@@ -13,6 +13,7 @@ use quadfrog::realtime::channel::{ConsolePorts, channels};
 use quadfrog::realtime::clock::SimulatedClock;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, DeniedSetting, RealtimeSetting};
 use quadfrog::realtime::thread::TickStart;
+use quadfrog::recording::disk::FreeSpace;
 use quadfrog::recording::record::{ArmingCheckRecord, Record, RequestRecord, Stamped};
 use quadfrog::recording::recorder::RecorderWatch;
 use quadfrog::robot::RobotState;
@@ -76,6 +77,7 @@ impl Session {
         unseen: Option<String>,
     ) -> Session {
         let robot = RobotDescription::embedded("go1").unwrap();
+        let space = folder.map(FreeSpace::watch).transpose().unwrap();
         let options = Options { trials: Some(5), observe, ..Options::new(config, robot, backend, Task::Forward) };
         let settings: ControlSettings = options.config.settings(&options.robot, options.task, backend).unwrap();
         let robot = LinkedRobot::lying(&options.robot, &options.config.simulator);
@@ -89,7 +91,7 @@ impl Session {
             ticks: collected,
             sinks: RecordSinks { recorder: to_recorder, console: to_screen },
             recorder: RecorderWatch::default(),
-            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), folder)
+            checklist: ArmingChecklist::new(&settings, fingerprint(&options.config, &options.robot), space)
                 .with_unseen_connection(unseen),
             approval: settings.approval,
             info: session_info(&options, ""),
@@ -257,6 +259,9 @@ fn without_its_guard_a_robot_is_not_armed() {
 #[test]
 fn while_its_guard_does_not_answer_a_robot_is_not_armed() {
     let mut session = Session::cleared();
+    session.supervisor.await_guard();
+    let answer = session.request(OperatorRequest::Arm);
+    assert!(!answer.accepted && answer.answer.contains("wait until it answers"), "{answer:?}");
     session.supervisor.report_guard_silent(true, session.time_ms * 1_000_000);
     let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("does not answer"), "{answer:?}");
@@ -422,6 +427,33 @@ fn a_full_disk_and_a_missing_recording_are_named() {
     let gone = std::path::PathBuf::from("/no/such/folder");
     let session = Session::new(Backend::Simulator, Some(gone));
     assert_eq!(session.state(ArmingCheck::Disk), ArmingCheckState::Failed);
+}
+
+/// Regression: the session asked the file system itself, and hung with a server of files that was gone.
+#[test]
+fn a_file_system_that_does_not_answer_holds_the_trials_and_not_the_session() {
+    let settings = Config::load(None).unwrap();
+    let robot = RobotDescription::embedded("go1").unwrap();
+    let settings = settings.settings(&robot, Task::Forward, Backend::Hardware).unwrap();
+    let (file_system, answers) = channel();
+    file_system.send(5000).unwrap();
+    let (space, thread) = FreeSpace::watch_by(move || answers.recv().map_err(std::io::Error::other)).unwrap();
+    let list = ArmingChecklist::new(&settings, String::new(), Some(space));
+    assert_eq!(list.disk_low(), None);
+    let until = |wanted: &dyn Fn(Option<String>) -> bool| {
+        while !wanted(list.disk_low()) {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+    };
+    until(&|low| low.is_some_and(|reason| reason.contains("the file system has not answered for")));
+    file_system.send(100).unwrap();
+    until(&|low| low.is_some_and(|reason| reason.contains("100 MB free")));
+    file_system.send(5000).unwrap();
+    until(&|low| low.is_none());
+    // Its thread ends with the list, at the next answer.
+    drop(list);
+    drop(file_system);
+    thread.join().unwrap();
 }
 
 /// STOP is everybody's: who only looks may press it, damping is sent then, and an acknowledgement gives the robot back to whose

@@ -8,7 +8,7 @@ use quadfrog::robot::go1::Go1;
 use quadfrog::robot::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::emulator::Emulator;
 use quadfrog::sim::{ActuatorKind, SimConfig};
-use quadfrog::telemetry::{Mode, Tick};
+use quadfrog::telemetry::Tick;
 use quadfrog::trial::Backend;
 
 /// An emulated robot behind its link. States may be changed, or lost on their way while commands arrive.

@@ -33,6 +33,7 @@ const RECORDER_GONE: &str = "the recorder's thread has ended";
 const OTHER_FILE: &str = "a file of the recording could not be begun or completed";
 const GUARD_LOST: &str =
     "the guard process has ended: nothing damps the robot if quadfrog is killed; sit down, quit and start again";
+const GUARD_STARTS: &str = "the guard process starts: wait until it answers";
 const GUARD_SILENT: &str = "the guard process does not answer: nothing damps the robot if quadfrog is killed; continue the process if it is stopped (`kill -CONT`), otherwise sit down, quit and start again";
 
 /// Period of reading the changes of other programs to the study, ns.
@@ -225,12 +226,18 @@ impl Supervisor {
         self.log(LogLevel::Error, GUARD_LOST.to_owned(), time_ns);
     }
 
+    /// Begins nothing that energises the robot until the guard process answers.
+    pub fn await_guard(&mut self) {
+        self.guard_objection = Some(GUARD_STARTS);
+    }
+
     /// Records whether the guard process answers. While it does not, nothing that energises the robot is begun.
     pub fn report_guard_silent(&mut self, silent: bool, time_ns: u64) {
-        self.guard_objection = silent.then_some(GUARD_SILENT);
-        match silent {
-            true => self.log(LogLevel::Error, GUARD_SILENT.to_owned(), time_ns),
-            false => self.log(LogLevel::Info, "the guard process answers again".to_owned(), time_ns),
+        let before = std::mem::replace(&mut self.guard_objection, silent.then_some(GUARD_SILENT));
+        if silent {
+            self.log(LogLevel::Error, GUARD_SILENT.to_owned(), time_ns);
+        } else if before == Some(GUARD_SILENT) {
+            self.log(LogLevel::Info, "the guard process answers again".to_owned(), time_ns);
         }
     }
 
