@@ -113,6 +113,42 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     assert!(lab.sockets().is_empty() && lab.listed().is_empty());
 }
 
+/// Regression: the observer left before it had sent the STOP that came in one read with the key that quits.
+#[test]
+fn a_stop_and_a_quit_at_once_stop_the_robot_of_a_watched_session() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    // Ctrl-C twice; F12 and q.
+    for keys in ["\x03\x03", "\x1b[24~q"] {
+        let mut watcher = lab.open(&["attach", "--operator", "Grace"]);
+        watcher.wait_for(&["WATCHING", "READY"]);
+        watcher.send(keys);
+        assert!(watcher.wait().success());
+        session.wait_for(&["DAMPED", "k acknowledges: STOP by Grace"]);
+        session.send("k");
+        session.wait_for(&["DISARMED"]);
+        session.send("A");
+        session.wait_for(&["READY"]);
+    }
+    assert!(session.quit().success());
+}
+
+/// A session that hangs confirms nothing: the observer waits for it and leaves all the same.
+#[test]
+fn an_observer_of_a_hung_session_can_quit_after_its_stop() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    let mut watcher = lab.open(&["attach"]);
+    watcher.wait_for(&["WATCHING"]);
+    session.signal(Signal::SIGSTOP);
+    watcher.send("\x03\x03");
+    assert!(watcher.wait().success());
+    session.signal(Signal::SIGCONT);
+    session.quit();
+}
+
 /// Regression: where neither USER nor LOGNAME names the user, as in a container, the operator was unknown.
 #[test]
 fn an_operator_without_variables_has_the_login_name() {

@@ -441,12 +441,13 @@ impl Console {
         Ok(())
     }
 
-    /// Ends the session. Sitting down takes seconds: the screen stays, and STOP keeps working.
+    /// Ends the session, or leaves a watched one. Sitting down takes seconds, an unconfirmed STOP at most one: the screen stays, and
+    /// STOP keeps working.
     fn end_session(mut self, inputs: &mut UnboundedReceiver<ReadEvent>) -> anyhow::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
-        let stop = self.feed.handle().map(EngineHandle::stop_latch);
+        let stop = self.feed.stop_latch();
         let jumps = matches!(self.model.mode(), Mode::Jump | Mode::Settle);
         if self.model.robot_is_energised() && (jumps || self.model.session.info.is_hardware()) {
             let first = if jumps { "lands" } else { "sits down" };

@@ -5,7 +5,7 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::{Answer, Demand, SessionFacts, line, read_message, socket_folders};
 use crate::realtime::channel::StopLatch;
@@ -14,6 +14,8 @@ use crate::realtime::channel::StopLatch;
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 /// Period in which a STOP is looked for.
 const STOP_PERIOD: Duration = Duration::from_millis(10);
+/// Longest wait of an observer that leaves for the session to confirm its STOP.
+const LONGEST_CONFIRMATION: Duration = Duration::from_secs(1);
 
 /// A session that runs on this machine under this user.
 #[derive(Debug)]
@@ -87,7 +89,7 @@ struct Connection {
     closing: AtomicBool,
 }
 
-/// An observer of a session; it leaves when it is dropped.
+/// An observer of a session; it leaves when it is dropped, once its STOPs are confirmed or after 1 s.
 pub struct Observer(Arc<Connection>);
 
 impl Observer {
@@ -126,22 +128,34 @@ impl Observer {
 
 impl Drop for Observer {
     fn drop(&mut self) {
+        // The process may exit after this and end the thread that sends.
+        let begun = Instant::now();
+        let unconfirmed = |status: ObserverStatus| !status.ended && status.stopped < status.demanded;
+        while unconfirmed(self.status()) && begun.elapsed() < LONGEST_CONFIRMATION {
+            std::thread::sleep(STOP_PERIOD);
+        }
         self.0.closing.store(true, Ordering::Release);
     }
+}
+
+/// Sends the STOPs that are demanded beyond the `sent` ones.
+fn send_stops(stream: &mut UnixStream, connection: &Connection, sent: &mut u64) -> io::Result<()> {
+    while *sent < connection.stop.count() {
+        stream.write_all(&line(&Demand::Stop)?)?;
+        *sent += 1;
+    }
+    Ok(())
 }
 
 fn pass_on(reader: &mut BufReader<UnixStream>, connection: &Connection) -> io::Result<()> {
     let mut sent = 0;
     let mut received = Vec::new();
     while !connection.closing.load(Ordering::Acquire) {
-        let demanded = connection.stop.count();
-        while sent < demanded {
-            reader.get_mut().write_all(&line(&Demand::Stop)?)?;
-            sent += 1;
-        }
+        send_stops(reader.get_mut(), connection, &mut sent)?;
         if read_message(reader, &mut received)? == Some(Answer::Stopped) {
             connection.stopped.fetch_add(1, Ordering::AcqRel);
         }
     }
-    Ok(())
+    // A STOP that was set during the last read.
+    send_stops(reader.get_mut(), connection, &mut sent)
 }

@@ -118,7 +118,8 @@ impl Feed {
         messages
     }
 
-    /// Ends the session: sits the robot down and closes the files.
+    /// Ends the session: sits the robot down and closes the files. An observer of a session leaves it once its STOP is confirmed, or
+    /// after 1 s.
     pub fn shutdown(self) {
         if let Feed::Live(handle) = self {
             handle.shutdown();
