@@ -2,6 +2,7 @@
 
 use crate::support::{Console, assert_shows, line_with, session, tick};
 use quadfrog::recording::record::Record;
+use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
 use quadfrog::telemetry::{Counters, RecentLateness, Snapshot};
 use quadfrog_console::message::Msg;
@@ -113,4 +114,26 @@ fn a_rewound_replay_forgets_the_health_after_the_playhead() {
     console.press(&["t"]);
     console.update(Msg::Rewound);
     assert!(!console.screen(120, 40).contains("45.00 C"));
+}
+
+/// Regression: on a full disk the frame still showed a green `REC`, and the last line offered a jump that the session refuses.
+#[test]
+fn a_failed_recording_is_not_shown_as_running_and_offers_no_jump() {
+    let mut console = Console::ready();
+    assert_shows(&console.screen(80, 24), &[" REC 00:00"]);
+    let full = || Some("session.mcap.part: File too large".to_owned());
+    let failed = RecorderStatus { error: full(), ..RecorderStatus::default() };
+    let of_another_file = RecorderStatus { warning: full(), ..RecorderStatus::default() };
+    for (status, shown) in [(failed, "NOT RECORDED 00:00"), (of_another_file, "REC INCOMPLETE 00:00")] {
+        console.update(Msg::Recorder(status));
+        for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+            let screen = console.screen(columns, rows);
+            assert_shows(&screen, &[shown]);
+            assert!(!screen.contains(" REC 0"), "{screen}");
+        }
+        assert_eq!(console.next_step(), "No jump now: the recording is not complete; 5 shows why.");
+        assert_eq!(console.press(&["g"]), []);
+        assert_shows(console.said(), &["g is not possible: the recording is not complete (session.mcap.part: File"]);
+        assert!(console.model.dialog.is_none());
+    }
 }

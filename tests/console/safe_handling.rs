@@ -154,7 +154,8 @@ fn a_console_whose_disk_is_full_ends_with_status_1_and_the_cause() {
     let mut session = Session::run(&program.path(""), (240, 40), command);
     session.wait_for(&["DISARMED"]);
     session.send("5");
-    session.wait_for(&["File too large"]);
+    session.wait_for(&["File too large", "NOT RECORDED"]);
+    assert!(!session.screen().contains(" REC "), "{}", session.screen());
     let (status, screen) = quit(&mut session);
     assert_eq!(status, 1, "{screen}");
     assert_shows(&screen, &["the recording is not complete", "File too large"]);

@@ -15,6 +15,9 @@ pub type Legality = Result<(), String>;
 /// Reason for which a replay, also that of a watched session that has ended, stops nothing.
 pub const NO_ROBOT_TO_STOP: &str = "this is a replay: there is no robot to stop";
 
+/// Reason for which the session approves no jump while its recording, or a file of it, is not complete.
+pub const RECORDING_FAILED: &str = "the recording is not complete";
+
 pub fn legal(action: Action, model: &Model) -> Legality {
     use Action as A;
     match action {
@@ -236,6 +239,9 @@ fn must_be_visible(model: &Model) -> Legality {
 fn may_approve(model: &Model) -> Legality {
     may_change_proposal(model)?;
     must_be_visible(model)?;
+    if let Some(error) = model.recording_failure() {
+        return refuse(format!("{RECORDING_FAILED} ({error})"));
+    }
     match (mode::next(model.mode(), Trigger::Approve), model.mode()) {
         (Some(_), _) => Ok(()),
         (None, Mode::Disarmed) => {

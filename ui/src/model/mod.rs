@@ -286,6 +286,11 @@ impl Model {
         self.message.as_ref().filter(|message| !stale(message))
     }
 
+    /// The error for which the recording is not complete; none while everything is recorded, and in a replay.
+    pub fn recording_failure(&self) -> Option<&str> {
+        self.recorder.as_ref()?.incomplete()
+    }
+
     /// Whether the robot sends no states: what is known of it is of an earlier time, or nothing.
     pub fn robot_is_silent(&self) -> bool {
         self.history.is_silent()

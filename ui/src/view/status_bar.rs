@@ -138,6 +138,11 @@ fn recording(model: &Model) -> Vec<Span<'static>> {
     }
     let counters = &model.snapshot.counters;
     let elapsed = clock(model.snapshot.tick.time_ns);
+    if let Some(status) = model.recorder.as_ref().filter(|status| status.incomplete().is_some()) {
+        // After the error of an earlier file the present one goes on.
+        let text = if status.error.is_some() { "NOT RECORDED " } else { "REC INCOMPLETE " };
+        return vec![span(theme, Role::Bad, text), Span::raw(format!("{elapsed} "))];
+    }
     match (model.session.info.recording.is_empty(), counters.ticks_not_recorded) {
         (true, _) => vec![span(theme, Role::Quiet, format!("not recording {elapsed} "))],
         (false, 0) => vec![span(theme, Role::Good, "REC "), Span::raw(format!("{elapsed} "))],

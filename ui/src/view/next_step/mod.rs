@@ -11,7 +11,7 @@ use quadfrog::trial::{ExperimentStage, Verdict};
 use super::{countdown, row_keys};
 use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
-use crate::legal::{legal, waiting_trial_is_meant};
+use crate::legal::{RECORDING_FAILED, legal, waiting_trial_is_meant};
 use crate::message::ReplayStatus;
 use crate::model::Model;
 use crate::model::dialog::Dialog;
@@ -139,6 +139,10 @@ fn live(model: &Model) -> NextStep {
             step("The study is finished.", model, &[&[first], &more[..], &rest, last.as_slice()].concat())
         }
         Mode::Disarmed => before_arming(model),
+        Mode::Ready if session.open_proposal().is_some() && model.recording_failure().is_some() => {
+            let lead = format!("No jump now: {RECORDING_FAILED}; {} shows why.", key(Action::HealthView));
+            step(lead, model, &[SIT_DOWN, QUIT])
+        }
         Mode::Ready if session.open_proposal().is_some() && model.snapshot.unready.is_some() => {
             let reason = model.snapshot.unready.map(|reason| reason.to_string()).unwrap_or_default();
             step(format!("No jump now: {reason}."), model, &[SIT_DOWN, OVERRIDE, (Action::Skip, "skip"), UNDO])
