@@ -254,6 +254,11 @@ fn stop_closes_every_form_and_applies_nothing_of_it() {
         assert_eq!(console.press(&["F12"]), [Effect::Stop], "{keys:?}");
         assert_eq!(console.said(), said, "{keys:?}");
         assert!(console.model.dialog.is_none(), "{keys:?}");
+        // Regression: after Ctrl-C nothing said that the form was closed.
+        console.press(keys);
+        assert_eq!(console.press(&["Ctrl-C"]), [Effect::Stop], "{keys:?}");
+        assert_eq!(console.said(), format!("{said}. Ctrl-C again within 2 s quits"), "{keys:?}");
+        assert!(console.model.dialog.is_none(), "{keys:?}");
     }
     // The field of the bounds names a form without a space, because Space is STOP there.
     let mut console = Console::ready();

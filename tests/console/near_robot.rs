@@ -1,11 +1,12 @@
 //! Safety of people near the robot: the first command, approvals on hardware, the countdown, an observer's STOP.
 
 use crate::support::{Console, assert_shows, session};
-use quadfrog::recording::record::{Record, SessionInfo};
+use quadfrog::engine::ObserverStatus;
+use quadfrog::recording::record::{LogLevel, Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{Mode, Snapshot, Tick};
 use quadfrog::trial::{Approval, Backend};
-use quadfrog_console::message::{Effect, Msg};
+use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 
 fn approval(trial: u32, revision: u32) -> Vec<OperatorRequest> {
     vec![OperatorRequest::Approve { trial, revision }]
@@ -157,5 +158,32 @@ fn arming_says_that_a_robot_which_needs_no_approval_jumps() {
         assert_eq!(arm, "Press A to arm: the robot stands up.");
         assert_shows(&question, &["The robot will stand up. Is the area clear?"]);
         assert_eq!(stands, "Standing up.");
+    }
+}
+
+/// Regression: Ctrl-C said "STOP: damping." of a STOP that was only requested, or that reached nothing.
+#[test]
+fn ctrl_c_gives_the_answer_of_the_stop_key() {
+    let mut observing = Console::new();
+    observing.record(Record::Session(SessionInfo { observe: true, ..session() }));
+    let watched = |ended| {
+        let mut console = Console::ready();
+        let observer = Some(ObserverStatus { ended, ..ObserverStatus::default() });
+        console.update(Msg::Replay(ReplayStatus { observer, ..ReplayStatus::default() }));
+        console
+    };
+    let cases = [
+        (observing, "STOP requested: damping is sent, a console in control", LogLevel::Warning),
+        (watched(false), "STOP demanded from the session", LogLevel::Warning),
+        (watched(true), "the session has ended: its robot cannot be stopped from here", LogLevel::Error),
+    ];
+    for (mut console, answer, level) in cases {
+        let effects = console.press(&["F12"]);
+        let of_stop = console.said().to_owned();
+        assert!(of_stop.starts_with(answer), "{of_stop}");
+        assert_eq!(console.press(&["Ctrl-C"]), effects);
+        assert_eq!(console.said(), format!("{of_stop}. Ctrl-C again within 2 s quits"));
+        assert_eq!(console.model.message.as_ref().map(|message| message.level), Some(level));
+        assert_eq!(console.press(&["Ctrl-C"]), [Effect::Quit]);
     }
 }

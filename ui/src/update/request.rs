@@ -23,10 +23,10 @@ pub(super) fn expire_interrupt(model: &mut Model) {
         return;
     }
     model.interrupted_at = None;
-    if let Some(rest) = model.message.as_mut().and_then(|message| message.text.strip_suffix(AGAIN_QUITS)) {
-        let rest = rest.trim_end().to_owned();
-        model.message =
-            model.message.take().filter(|_| !rest.is_empty()).map(|message| Notice { text: rest, ..message });
+    if let Some(message) = &mut model.message
+        && let Some(answer) = message.text.strip_suffix(AGAIN_QUITS)
+    {
+        message.text = answer.trim_end().to_owned();
     }
 }
 
@@ -155,9 +155,9 @@ pub(super) fn interrupt(model: &mut Model) -> Vec<Effect> {
         return vec![Effect::Quit];
     }
     let effects = stop(model);
-    match effects.is_empty() {
-        true => reply(model, LogLevel::Warning, AGAIN_QUITS),
-        false => say_stop(model, &format!("STOP: damping. {AGAIN_QUITS}")),
+    // The answer to STOP stays: it says what STOP has reached.
+    if let Some(answer) = &mut model.message {
+        answer.text += &format!(". {AGAIN_QUITS}");
     }
     effects
 }
