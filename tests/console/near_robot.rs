@@ -187,3 +187,27 @@ fn ctrl_c_gives_the_answer_of_the_stop_key() {
         assert_eq!(console.press(&["Ctrl-C"]), [Effect::Quit]);
     }
 }
+
+/// Regression: while braking commands were sent, the last line said that nothing was sent, and Ctrl-Z stopped the program.
+#[test]
+fn a_silent_robot_whose_control_is_taken_is_sent_commands() {
+    let mut console = on_hardware(Console::new());
+    console.mode(Mode::Offline);
+    console.wait(1000);
+    assert_eq!(console.next_step(), "The robot is silent, nothing was sent to it. L takes control.");
+    assert_eq!(console.press(&["Ctrl-Z"]), [Effect::Suspend], "nothing was sent");
+    assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
+    console.answer("take control", false, "the robot is DISARMED");
+    assert_shows(&console.next_step(), &["nothing was sent to it"]);
+    console.answer("take control", true, "braking commands are sent until the robot answers, then damping");
+    assert_eq!(console.next_step(), "Braking commands are sent until the robot answers; it is then damped.");
+    assert_eq!(console.press(&["Ctrl-Z"]), []);
+    assert_shows(console.said(), &["a suspended program sends the robot nothing"]);
+    console.mode(Mode::Observe);
+    assert_eq!(console.next_step(), "The robot sends states; it is damped from now on.");
+    // A Go2 is sent nothing before its first state.
+    let go2 = SessionInfo { backend: Some(Backend::Hardware), robot: "go2".into(), ..session() };
+    console.model.session.info = go2;
+    console.mode(Mode::Offline);
+    assert_eq!(console.next_step(), "Braking commands may be sent until the robot answers; it is then damped.");
+}

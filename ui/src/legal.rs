@@ -356,7 +356,8 @@ fn may_rerun(model: &Model) -> Legality {
 
 /// A stopped process sends nothing, not even the damping commands that a real robot needs.
 fn may_suspend(model: &Model) -> Legality {
-    if model.replay.is_none() && model.session.info.is_hardware() && model.mode().commanded() {
+    let commanded = model.mode().commanded() || model.session.control_taken;
+    if model.replay.is_none() && model.session.info.is_hardware() && commanded {
         refuse("a suspended program sends the robot nothing, not even damping; quit it instead")
     } else if model.robot_is_energised() {
         let sit_down = model.keymap.key(Action::SitDown);

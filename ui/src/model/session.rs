@@ -35,6 +35,8 @@ pub struct SessionModel {
     pub log: SessionLog,
     /// The trial that was judged last.
     pub last_judged: Option<u32>,
+    /// Whether the session has taken control of a real robot: from then on it may send commands, also before the robot answers.
+    pub control_taken: bool,
     /// Cause of the newest DAMPED or FAULT.
     pub stopped_because: String,
     /// Cause for which the robot sat down without a request; empty once the operator has made one.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use quadfrog::engine::STOP_BY;
 use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
+use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::session::storage::{ANSWERED_AFTER, ANSWERS_LATER};
 use quadfrog::telemetry::{Fault, Mode, TransitionCause};
 use quadfrog::trial::{
@@ -126,6 +127,7 @@ fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             }
             model.session.info = info;
             if !continued {
+                model.session.control_taken = false;
                 log(model, time_ns, LogLevel::Info, "session", text, false);
             }
         }
@@ -334,6 +336,7 @@ fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
     let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
     if command.accepted {
         model.session.sat_down_because.clear();
+        model.session.control_taken |= command.request == OperatorRequest::TakeControl.to_string();
     }
     let text = match command.answer.as_str() {
         "" => command.request.clone(),

@@ -127,8 +127,17 @@ fn live(model: &Model) -> NextStep {
         }
         _ if stage == Some(ExperimentStage::Review) => review(model),
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
-            let heard = if mode == Mode::Offline { "The robot is silent" } else { "The robot sends states" };
-            let lead = format!("{heard}, nothing was sent to it. {} takes control.", key(Action::TakeControl));
+            let take = key(Action::TakeControl);
+            let lead = match (mode, session.control_taken) {
+                (Mode::Offline, false) => format!("The robot is silent, nothing was sent to it. {take} takes control."),
+                (_, false) => format!("The robot sends states, nothing was sent to it. {take} takes control."),
+                (Mode::Offline, true) => {
+                    // A Go2 is sent nothing before its first state.
+                    let sent = if session.info.robot == "go1" { "are" } else { "may be" };
+                    format!("Braking commands {sent} sent until the robot answers; it is then damped.")
+                }
+                (_, true) => "The robot sends states; it is damped from now on.".to_owned(),
+            };
             step(lead, model, &[QUIT])
         }
         Mode::Offline | Mode::Observe => step("Waiting for the robot to answer.", model, &[QUIT]),
