@@ -159,6 +159,7 @@ fn the_dialog_of_a_confirmation_says_how_many_repeats_it_takes() {
     for verdict in [None, Some(Verdict::Accept)] {
         console.record(Record::Trial(trial(5, verdict, None)));
     }
+    console.stage(ExperimentStage::Review, 5);
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 6, can_undo: true, jumps: 0 }));
     console.press(&["K"]);
     let note = "The verdict of trial #5 then stays: u does not take it back any longer.";

@@ -531,6 +531,7 @@ fn the_line_after_a_stop_names_the_rerun_and_that_of_undo_its_trial() {
     for verdict in [None, Some(Verdict::Accept)] {
         console.record(Record::Trial(trial(0, verdict, Some(Verdict::Accept))));
     }
+    console.stage(ExperimentStage::Review, 0);
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
     console.mode(Mode::Disarmed);
     assert_shows(console.screen(120, 40).lines().last().unwrap(), &["u undo #0"]);
@@ -607,6 +608,7 @@ fn the_last_verdict_is_taken_back_from_another_row_after_a_question_alone() {
     for verdict in [None, Some(Verdict::Void)] {
         console.record(Record::Trial(trial(2, verdict, None)));
     }
+    console.stage(ExperimentStage::Review, 2);
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 3, can_undo: true, jumps: 0 }));
     assert_eq!(console.requests(&["2", "Home", "u"]), [], "trial 0 is selected");
     let screen = console.screen(80, 24);
@@ -619,6 +621,32 @@ fn the_last_verdict_is_taken_back_from_another_row_after_a_question_alone() {
     // On its own row, and in another view, it is taken back at once.
     assert_eq!(console.requests(&["End", "u"]), [OperatorRequest::Undo]);
     assert_eq!(console.requests(&["Home", "1", "u"]), [OperatorRequest::Undo]);
+}
+
+/// Regressions: after the first of several repeats the screen named the trial before, and after the verdict of another program's trial
+/// that one.
+#[test]
+fn undo_names_the_trial_whose_verdict_the_session_takes_back() {
+    let mut console = Console::review(Mode::Ready, Verdict::Accept);
+    let next = |console: &mut Console, trial: u32| {
+        let (stage, can_undo, jumps) = (ExperimentStage::Proposed, true, 0);
+        console.record(Record::Proposal(proposal(trial, trial)));
+        console.record(Record::Stage(StageRecord { stage, trial, can_undo, jumps }));
+    };
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), None)));
+    next(&mut console, 1);
+    assert_shows(&console.screen(120, 40), &["undo #0"]);
+    // Another program's trial.
+    for verdict in [None, Some(Verdict::Fall)] {
+        console.record(Record::Trial(trial(7, verdict, None)));
+    }
+    assert_shows(&console.screen(120, 40), &["undo #0"]);
+    // The first repeat of trial 1 was accepted: the trial has no verdict yet.
+    console.stage(ExperimentStage::Running, 1);
+    console.record(Record::Trial(trial(1, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 1);
+    next(&mut console, 1);
+    assert_shows(&console.screen(120, 40), &["undo #1"]);
 }
 
 /// Regression: after a fall without a STOP the line said "STOPPED", and with another row selected the line hid the trial

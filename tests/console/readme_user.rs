@@ -370,6 +370,7 @@ fn the_end_of_a_confirmation_is_asked_for() {
         console.record(Record::Trial(trial(number, verdict, None)));
     }
     console.record(Record::Search(SearchStatus { confirming: Some(4), ..SearchStatus::default() }));
+    console.stage(ExperimentStage::Review, 1);
     console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 2, can_undo: true, jumps: 0 }));
     assert_eq!(console.requests(&["K"]), []);
     let screen = console.screen(80, 24);

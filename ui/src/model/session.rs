@@ -33,7 +33,7 @@ pub struct SessionModel {
     pub insight: Option<ProposalInsight>,
     pub trials: Trials,
     pub log: SessionLog,
-    /// The trial that was judged last.
+    /// The trial that was judged last, or a repeat of it: the one whose verdict the session takes back while it can.
     pub last_judged: Option<u32>,
     /// Whether the session has taken control of a real robot: from then on it may send commands, also before the robot answers.
     pub control_taken: bool,

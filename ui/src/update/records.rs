@@ -162,6 +162,13 @@ fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             log(model, time_ns, level, "mode", text, change.to == Mode::Fault);
         }
         Record::Stage(info) => {
+            if let Some(before) = model.session.stage
+                && before.stage == ExperimentStage::Review
+                && info.stage != ExperimentStage::Review
+                && info.can_undo
+            {
+                model.session.last_judged = Some(before.trial);
+            }
             let entered =
                 model.session.stage.is_none_or(|before| (before.stage, before.trial) != (info.stage, info.trial));
             model.session.stage = Some(info);
@@ -214,7 +221,6 @@ fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
             let number = trial.trial;
             let waited = model.session.trials.records.get(&number).is_some_and(|before| before.verdict.is_none());
             if waited && trial.verdict.is_some() {
-                model.session.last_judged = Some(number);
                 say_verdict_by_rule(model, &trial);
             }
             model.session.trials.records.insert(number, trial);
