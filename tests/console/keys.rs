@@ -4,7 +4,7 @@ use crate::support::{Console, VIEWS, assert_shows, proposal, requests, session, 
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{Backend, ExperimentStage, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, ProposalSource, TrialRecord, Verdict};
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::keymap::{Key, Keymap};
 use quadfrog_console::message::{Effect, Msg};
@@ -550,4 +550,23 @@ fn voiding_a_tripped_limit_asks_for_the_reason() {
     }
     // A fall may be voided with one key.
     assert_eq!(Console::review(Mode::Damped, Verdict::Fall).requests(&["v"]), [OperatorRequest::Judge(Verdict::Void)]);
+}
+
+/// Regression: the form stayed open over the exchange of its proposal by a queued point under the same number, and Enter set the old
+/// values in that.
+#[test]
+fn a_form_and_a_question_about_a_proposal_close_when_it_is_exchanged() {
+    for keys in [&["o", "Right"][..], &["Q"]] {
+        let mut console = Console::ready();
+        console.press(keys);
+        assert!(console.model.dialog.is_some(), "{keys:?}: {}", console.said());
+        // A new number alone changes nothing of it.
+        console.record(Record::Proposal(proposal(1, 0)));
+        assert!(console.model.dialog.is_some(), "{keys:?}: {}", console.said());
+        let queued = Proposal { source: ProposalSource::Operator, ..proposal(1, 1) };
+        console.record(Record::Proposal(queued));
+        assert!(console.model.dialog.is_none(), "{keys:?}");
+        assert_eq!(console.said(), "the question was closed: the situation has changed");
+        assert_eq!(console.requests(&["Esc"]), []);
+    }
 }

@@ -104,7 +104,7 @@ pub enum Question {
     /// Accept a trial, or judge it a fall, whose suggested verdict is another.
     JudgeAnyway { trial: u32, verdict: Verdict },
     /// Queue the values of the open proposal, which is queued itself or the sampler's, unchanged: they may run twice.
-    QueueProposed { trial: u32 },
+    QueueProposed { trial: u32, revision: u32 },
     /// Remove a point from the queue.
     RemoveQueued { trial: u32 },
     /// Take a verdict back while another row is selected.
@@ -294,6 +294,8 @@ impl Dialog {
 #[expect(missing_docs, reason = "the names say the rest")]
 pub struct OverrideForm {
     pub trial: u32,
+    /// Revision of the proposal whose values the form holds.
+    pub revision: u32,
     /// Parameters, then gains.
     pub rows: Vec<OverrideRow>,
     pub selected: usize,
@@ -341,6 +343,7 @@ impl OverrideForm {
         let selected = selected.min(rows.len().saturating_sub(1));
         OverrideForm {
             trial: proposal.trial,
+            revision: proposal.revision,
             rows,
             selected,
             typing: None,

@@ -72,10 +72,10 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
         Action::Bounds => bounds(model),
         Action::QueuePoint => {
             let Some(proposal) = model.session.open_proposal() else { return Vec::new() };
-            let (trial, point) = (proposal.trial, queued_values(proposal));
+            let (trial, revision, point) = (proposal.trial, proposal.revision, queued_values(proposal));
             // A queued point would run twice, and the sampler's while it draws at random: the queued trial uses up no draw.
             match model.session.is_queued(trial) || proposal.source == ProposalSource::Sampler {
-                true => open(model, Dialog::Confirm(Question::QueueProposed { trial })),
+                true => open(model, Dialog::Confirm(Question::QueueProposed { trial, revision })),
                 false => return request(model, OperatorRequest::Enqueue(point)),
             }
         }

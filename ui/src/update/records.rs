@@ -24,22 +24,23 @@ use crate::settings::BellCause;
 /// Time for which another message replaces the reason of a fault, or why the robot sat down.
 const REASON_AGAIN: Duration = Duration::from_secs(5);
 
-/// Closes a question that no longer applies: an approval holds for the shown revision and while the robot stands.
+/// Closes a question that no longer applies: one about a proposal holds for the shown revision, an approval while the robot stands.
 pub(super) fn close_stale_dialog(model: &mut Model) {
+    let is_another = |proposal: Option<&Proposal>, trial: u32, revision: u32| {
+        proposal.map(|p| (p.trial, p.revision)) != Some((trial, revision))
+    };
     let stale = match &model.dialog {
         Some(Dialog::Approve { trial, revision, .. }) => {
-            let shown = model.session.proposal.as_ref().map(|p| (p.trial, p.revision));
-            shown != Some((*trial, *revision)) || legal(Action::Approve, model).is_err()
+            is_another(model.session.proposal.as_ref(), *trial, *revision) || legal(Action::Approve, model).is_err()
         }
         Some(Dialog::Confirm(Question::Skip { trial, revision })) => {
-            let shown = model.session.open_proposal().map(|p| (p.trial, p.revision));
-            shown != Some((*trial, *revision)) || legal(Action::Skip, model).is_err()
+            is_another(model.session.open_proposal(), *trial, *revision) || legal(Action::Skip, model).is_err()
         }
         Some(Dialog::Confirm(Question::JudgeAnyway { trial, .. } | Question::HandValue { trial, .. })) => {
             model.session.under_review().is_none_or(|row| row.trial != *trial)
         }
-        Some(Dialog::Confirm(Question::QueueProposed { trial })) => {
-            model.session.open_proposal().is_none_or(|proposal| proposal.trial != *trial)
+        Some(Dialog::Confirm(Question::QueueProposed { trial, revision })) => {
+            is_another(model.session.open_proposal(), *trial, *revision)
         }
         Some(Dialog::Confirm(Question::RemoveQueued { trial })) => !model.session.is_queued(*trial),
         Some(Dialog::Confirm(Question::EndRepeats)) => {
@@ -50,7 +51,7 @@ pub(super) fn close_stale_dialog(model: &mut Model) {
         Some(Dialog::TakeControl) => legal(Action::TakeControl, model).is_err(),
         Some(Dialog::Arm { .. }) => legal(Action::Arm, model).is_err(),
         Some(Dialog::Override(form)) => {
-            model.session.proposal.as_ref().is_none_or(|p| p.trial != form.trial)
+            is_another(model.session.proposal.as_ref(), form.trial, form.revision)
                 || legal(Action::Override, model).is_err()
         }
         _ => false,
@@ -76,7 +77,7 @@ fn renumber(model: &mut Model, proposal: &Proposal) {
     let asked = match &mut model.dialog {
         Some(
             Dialog::Approve { trial, .. }
-            | Dialog::Confirm(Question::Skip { trial, .. } | Question::QueueProposed { trial }),
+            | Dialog::Confirm(Question::Skip { trial, .. } | Question::QueueProposed { trial, .. }),
         ) => Some(trial),
         Some(Dialog::Override(form)) => Some(&mut form.trial),
         _ => None,

@@ -199,7 +199,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             ];
             (title, lines)
         }
-        Question::QueueProposed { trial } => {
+        Question::QueueProposed { trial, .. } => {
             let (title, text) = match model.session.is_queued(*trial) {
                 true => (
                     "Queue it once more?",

@@ -106,8 +106,8 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
             request_if_legal(model, Action::Rerun, OperatorRequest::Rerun { trial: Some(*trial) }, "not queued")
         }
         Question::Rerun { .. } => cancelled(model, "not queued"),
-        Question::QueueProposed { trial } if yes => match model.session.open_proposal() {
-            Some(proposal) if proposal.trial == *trial => {
+        Question::QueueProposed { trial, revision } if yes => match model.session.open_proposal() {
+            Some(proposal) if (proposal.trial, proposal.revision) == (*trial, *revision) => {
                 let point = OperatorRequest::Enqueue(queued_values(proposal));
                 request_if_legal(model, Action::QueuePoint, point, "not queued")
             }
