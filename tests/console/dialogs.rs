@@ -5,9 +5,11 @@ use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{ArmingCheckRecord, LogLevel, LogRecord, Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{ArmingCheck, ArmingCheckState, Mode};
-use quadfrog::trial::{Backend, ProposalSource, QueuedPoint, SearchStatus, Verdict};
-use quadfrog_console::action::ACTIONS;
+use quadfrog::trial::{Backend, ExperimentStage, ProposalSource, QueuedPoint, SearchStatus, Verdict};
+use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
+use quadfrog_console::model::View;
+use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::text::{as_csv, as_markdown};
 use strum::VariantArray;
 
@@ -507,4 +509,55 @@ fn the_help_of_a_replay_lists_no_key_that_commands_the_robot() {
     // An observer's STOP reaches the robot.
     let watched = keys(&read(Some(ObserverStatus::default())));
     assert!(watched.contains("STOP: damp all motors") && !watched.contains("approve the jump"));
+}
+
+/// Regression: when the stage changed, the list of actions was sorted anew under the mark, and Enter did something else.
+#[test]
+fn the_selected_action_stays_selected_when_others_become_possible() {
+    let mut console = Console::ready();
+    console.stage(ExperimentStage::Running, 0);
+    console.mode(Mode::Settle);
+    console.press(&[":"]);
+    let number = |console: &Console| {
+        let screen = console.screen(80, 24);
+        screen.split_once("Actions (").unwrap().1.split(' ').next().unwrap().parse::<usize>().unwrap()
+    };
+    let is_selected = |console: &Console| {
+        matches!(console.model.dialog, Some(Dialog::Palette { selected: Some(Action::HealthView), .. }))
+    };
+    while !is_selected(&console) {
+        console.press(&["Down"]);
+    }
+    let before = number(&console);
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    console.mode(Mode::Review);
+    assert!(number(&console) > before, "the verdicts stand above");
+    assert_eq!(console.press(&["Enter"]), []);
+    assert_eq!(console.model.view, View::Health);
+}
+
+/// Regression: when the first point of the queue ran, the keys moved and removed the one below the selected one.
+#[test]
+fn the_selected_point_stays_selected_when_the_first_one_runs() {
+    let mut console = Console::ready();
+    let queue = |console: &mut Console, trials: std::ops::Range<u32>| {
+        let point = |trial| QueuedPoint { trial, source: ProposalSource::Operator, ..QueuedPoint::default() };
+        let status = SearchStatus { queue: trials.map(point).collect(), ..SearchStatus::default() };
+        console.record(Record::Search(status));
+    };
+    queue(&mut console, 5..9);
+    console.press(&["N", "Down"]);
+    queue(&mut console, 6..9);
+    let moved = |trial| [OperatorRequest::MoveQueued { trial, earlier: false }];
+    assert_eq!(console.requests(&["Right"]), moved(6));
+    // The moved point has the number of the one with which it changed places.
+    assert_eq!(console.requests(&["Right"]), moved(7));
+    console.press(&["Home", "x"]);
+    assert_shows(&console.next_step(), &["remove trial #6 from the queue"]);
+    console.press(&["n"]);
+    // The selected one itself runs: the next one is selected.
+    queue(&mut console, 7..9);
+    console.press(&["x"]);
+    assert_shows(&console.next_step(), &["remove trial #7 from the queue"]);
 }

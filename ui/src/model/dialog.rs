@@ -6,6 +6,7 @@ use quadfrog::trial::{ParameterInfo, Proposal, ProposedParameter, Verdict};
 use tui_input::Input;
 
 use super::session::SessionModel;
+use crate::action::Action;
 
 /// Least time in which a person types the letters that arm the robot: a pasted text arrives at once.
 pub const ARMING_TIME: Duration = Duration::from_millis(250);
@@ -20,7 +21,8 @@ pub const APPROVAL_TIME: Duration = Duration::from_secs(20);
 /// Most columns of a dialog: longer lines are hard to read.
 pub const MAX_WIDTH: u16 = 120;
 
-/// A dialog over the view; `selected` is a line of its list, `scroll` counts lines above the shown ones.
+/// A dialog over the view; `selected` is a line of its list, or the content of a line that can move, `scroll` counts lines above the
+/// shown ones.
 #[derive(Debug, Clone)]
 #[expect(missing_docs, reason = "the names say the rest")]
 pub enum Dialog {
@@ -67,7 +69,8 @@ pub enum Dialog {
     /// All actions with a filter.
     Palette {
         input: Input,
-        selected: usize,
+        /// None where no action passes the filter.
+        selected: Option<Action>,
     },
     Help {
         scroll: usize,
@@ -83,7 +86,8 @@ pub enum Dialog {
     },
     /// The queued points.
     Queue {
-        selected: usize,
+        /// Trial of a point; the next one is selected once it has left the queue. None selects the first one.
+        selected: Option<u32>,
     },
     Details {
         trial: u32,

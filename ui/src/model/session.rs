@@ -205,6 +205,13 @@ impl SessionModel {
         self.search.as_ref().map_or(&[], |search| &search.queue)
     }
 
+    /// Returns the row of the queue with a selected trial; of one that has left the queue the row of the next one.
+    pub fn queue_row(&self, selected: Option<u32>) -> usize {
+        let queue = self.queue();
+        let selected = selected.unwrap_or(0);
+        queue.iter().position(|point| point.trial >= selected).unwrap_or(queue.len().saturating_sub(1))
+    }
+
     /// Whether a trial is in the queue.
     pub fn is_queued(&self, trial: u32) -> bool {
         self.queue().iter().any(|point| point.trial == trial)

@@ -8,13 +8,14 @@ use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, Proposal, ProposalSource, Verdict, six_digits};
 use strum::VariantArray;
+use tui_input::Input;
 
 use super::beside;
 use super::navigate::{filter, freeze, move_by, move_cursor, next_mode, next_series, next_sort, zoom};
 use super::rejudged;
 use super::request::{drop_answer, interrupt, reply, request, stop};
 use crate::action::Action;
-use crate::legal::{legal, may_request};
+use crate::legal::{legal, may_request, palette};
 use crate::message::{Effect, ExportedRows, ReplayCommand, ReplayStep};
 use crate::model::dialog::{Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose, Question};
 use crate::model::{Model, View};
@@ -79,7 +80,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
                 false => return request(model, OperatorRequest::Enqueue(point)),
             }
         }
-        Action::Queue => open(model, Dialog::Queue { selected: 0 }),
+        Action::Queue => open(model, Dialog::Queue { selected: None }),
         Action::Skip => {
             if let Some(&Proposal { trial, revision, .. }) = model.session.open_proposal() {
                 open(model, Dialog::Confirm(Question::Skip { trial, revision }));
@@ -202,7 +203,7 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
             reply(model, LogLevel::Info, "no trial is compared any longer");
             return beside::ended(model);
         }
-        Action::Palette => open(model, Dialog::Palette { input: Default::default(), selected: 0 }),
+        Action::Palette => open_palette(model, Default::default()),
         Action::Help => open(model, Dialog::Help { scroll: 0 }),
         Action::Report => {
             let lines = report(&model.session, usize::from(model.size.0.min(MAX_WIDTH)).saturating_sub(4));
@@ -245,6 +246,12 @@ pub(super) fn perform(model: &mut Model, action: Action) -> Vec<Effect> {
 
 fn open(model: &mut Model, dialog: Dialog) {
     model.dialog = Some(dialog);
+}
+
+/// Opens the list of actions with the first one selected that passes the filter.
+pub(super) fn open_palette(model: &mut Model, input: Input) {
+    let selected = palette(input.value(), model).first().map(|(info, _)| info.action);
+    open(model, Dialog::Palette { input, selected });
 }
 
 fn open_override(model: &mut Model) {

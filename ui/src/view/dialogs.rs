@@ -68,7 +68,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
         Dialog::Queue { selected } => {
             // Within the border and its margins.
             let width = usize::from(area.width.min(MAX_WIDTH).saturating_sub(4));
-            let (lines, of_selected) = queue::lines(model, *selected, width);
+            let (lines, of_selected) = queue::lines(model, model.session.queue_row(*selected), width);
             // The selected point stays in sight.
             let scroll = (of_selected.end + 2).saturating_sub(usize::from(area.height));
             render_lines(frame, area, model, ("Queue", MAX_WIDTH, "Up Down Home End"), lines, scroll);
@@ -389,11 +389,11 @@ fn by_hand(model: &Model, trial: u32) -> String {
     }
 }
 
-fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: usize) {
+fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, selected: Option<Action>) {
     let theme = &model.theme;
     let actions = palette(input.value(), model);
-    let title =
-        format!("Actions ({} of {}, Up Down PgUp PgDn Home End)", (selected + 1).min(actions.len()), actions.len());
+    let number = actions.iter().position(|(info, _)| Some(info.action) == selected).map_or(0, |at| at + 1);
+    let title = format!("Actions ({number} of {}, Up Down PgUp PgDn Home End)", actions.len());
     let inner = open_box(frame, area, model, &title, area.width.min(MAX_WIDTH), area.height.min(24));
     let mut spans = vec![span(theme, Role::Key, ":")];
     spans.extend(edited(theme, input));
@@ -401,17 +401,18 @@ fn render_palette(frame: &mut Frame, area: Rect, model: &Model, input: &Input, s
     let list = Rect { y: inner.y + 2, height: inner.height.saturating_sub(2), ..inner };
     let mut lines = Vec::new();
     let mut end_of_selected = 0;
-    for (index, (info, legal)) in actions.into_iter().enumerate() {
+    for (info, legal) in actions {
+        let selected = Some(info.action) == selected;
         let (key, name) = (model.keymap.key(info.action), info.name);
         let text = match &legal {
             Ok(()) => help::text_of(info, model).to_owned(),
             Err(reason) => format!("({reason})"),
         };
         let role = if legal.is_ok() { Role::Text } else { Role::Quiet };
-        let style = if index == selected { theme.style(Role::Selected) } else { theme.style(role) };
+        let style = if selected { theme.style(Role::Selected) } else { theme.style(role) };
         let row = Line::from(Span::styled(format!("{key:<9} {name:<16}{text}"), style));
         lines.extend(wrap(&row, usize::from(list.width), PALETTE_INDENT));
-        if index == selected {
+        if selected {
             end_of_selected = lines.len();
         }
     }

@@ -116,8 +116,7 @@ pub(super) fn question_key(model: &mut Model, key: Key, question: &Question) -> 
         Question::QueueProposed { .. } => cancelled(model, "not queued"),
         Question::RemoveQueued { trial } => {
             // Back to the list, which shows what the session answers.
-            let selected = model.session.queue().iter().position(|point| point.trial == *trial).unwrap_or(0);
-            model.dialog = Some(Dialog::Queue { selected });
+            model.dialog = Some(Dialog::Queue { selected: Some(*trial) });
             match yes {
                 true => request(model, OperatorRequest::RemoveQueued { trial: *trial }),
                 false => cancelled(model, "not removed"),

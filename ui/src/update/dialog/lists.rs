@@ -7,15 +7,15 @@ use tui_input::Input;
 
 use super::text_field::edit;
 use crate::action::Action;
-use crate::help;
 use crate::keymap::Key;
 use crate::layout::{dialog_columns, dialog_rows};
-use crate::legal::{may_request, palette};
+use crate::legal::{legal, may_request, palette};
 use crate::message::Effect;
 use crate::model::dialog::{Choice, Dialog, Question};
 use crate::model::live::Panel;
 use crate::model::{Model, View};
 use crate::update::navigate::move_by;
+use crate::update::perform::open_palette;
 use crate::update::request::{cancelled, refused, request, unknown_key};
 use crate::wrap::wrap_all;
 
@@ -25,39 +25,40 @@ const DETAILS_PAGE: usize = 10;
 const LOG_PAGE: usize = 10;
 
 /// The action that Enter chooses in the palette. Arming is not among them: it is confirmed first.
-pub(super) fn chosen_action(model: &Model, key: Key, filter: &str, selected: usize) -> Option<Action> {
-    if key.code() != KeyCode::Enter {
-        return None;
-    }
-    let (info, legal) = palette(filter, model).into_iter().nth(selected)?;
-    (info.action != Action::Arm || legal.is_err()).then_some(info.action)
+pub(super) fn chosen_action(model: &Model, key: Key, selected: Option<Action>) -> Option<Action> {
+    selected
+        .filter(|_| key.code() == KeyCode::Enter)
+        .filter(|action| *action != Action::Arm || legal(Action::Arm, model).is_err())
 }
 
 /// Actions that a key of the palette pages over: fewer than fit where some have two lines.
 const PALETTE_PAGE: usize = 10;
 
-pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, mut selected: usize) -> Vec<Effect> {
-    let rows = palette(input.value(), model);
-    match key.code() {
+pub(super) fn palette_key(model: &mut Model, key: Key, mut input: Input, selected: Option<Action>) -> Vec<Effect> {
+    let rows: Vec<Action> = palette(input.value(), model).iter().map(|(info, _)| info.action).collect();
+    let last = rows.len().saturating_sub(1);
+    let at = rows.iter().position(|action| Some(*action) == selected).unwrap_or(0);
+    let at = match key.code() {
         KeyCode::Esc => return Vec::new(),
-        KeyCode::Up => selected = selected.saturating_sub(1),
-        KeyCode::Down => selected = (selected + 1).min(rows.len().saturating_sub(1)),
-        KeyCode::PageUp => selected = selected.saturating_sub(PALETTE_PAGE),
-        KeyCode::PageDown => selected = (selected + PALETTE_PAGE).min(rows.len().saturating_sub(1)),
-        KeyCode::Home => selected = 0,
-        KeyCode::End => selected = rows.len().saturating_sub(1),
+        KeyCode::Up => at.saturating_sub(1),
+        KeyCode::Down => (at + 1).min(last),
+        KeyCode::PageUp => at.saturating_sub(PALETTE_PAGE),
+        KeyCode::PageDown => (at + PALETTE_PAGE).min(last),
+        KeyCode::Home => 0,
+        KeyCode::End => last,
         // Enter never starts motion: `chosen_action` leaves arming, which is confirmed here.
-        KeyCode::Enter if rows.get(selected).is_some() => {
+        KeyCode::Enter if selected.is_some() => {
             model.dialog = Some(Dialog::Arm { typed: 0, opened_at: model.clock });
             return Vec::new();
         }
         KeyCode::Enter => return cancelled(model, "no such action"),
         _ => {
             edit(&mut input, key);
-            selected = 0;
+            open_palette(model, input);
+            return Vec::new();
         }
-    }
-    model.dialog = Some(Dialog::Palette { input, selected });
+    };
+    model.dialog = Some(Dialog::Palette { input, selected: rows.get(at).copied() });
     Vec::new()
 }
 
@@ -132,26 +133,26 @@ fn toggle<T: Copy + PartialEq + VariantArray>(on: &mut Vec<T>, index: usize) {
 }
 
 /// Moves and removes queued points; the list stays open and shows what the session answers.
-pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Effect> {
-    let queue = model.session.queue();
-    let last = queue.len().saturating_sub(1);
-    let selected = selected.min(last);
-    let trial = queue.get(selected).map(|point| point.trial);
+pub(super) fn queue_key(model: &mut Model, key: Key, selected: Option<u32>) -> Vec<Effect> {
+    let trials: Vec<u32> = model.session.queue().iter().map(|point| point.trial).collect();
+    let last = trials.len().saturating_sub(1);
+    let at = model.session.queue_row(selected);
+    let trial = trials.get(at).copied();
     // A moved point changes places with its neighbour, whose number it has then.
-    let (selected, change) = match (key.code(), trial) {
-        (KeyCode::Up, Some(_)) => (selected.saturating_sub(1), None),
-        (KeyCode::Down, Some(_)) => ((selected + 1).min(last), None),
+    let (at, change) = match (key.code(), trial) {
+        (KeyCode::Up, Some(_)) => (at.saturating_sub(1), None),
+        (KeyCode::Down, Some(_)) => ((at + 1).min(last), None),
         (KeyCode::Home, Some(_)) => (0, None),
         (KeyCode::End, Some(_)) => (last, None),
         (KeyCode::Left, Some(trial)) => {
-            (selected.saturating_sub(1), Some(OperatorRequest::MoveQueued { trial, earlier: true }))
+            (at.saturating_sub(1), Some(OperatorRequest::MoveQueued { trial, earlier: true }))
         }
         (KeyCode::Right, Some(trial)) => {
-            ((selected + 1).min(last), Some(OperatorRequest::MoveQueued { trial, earlier: false }))
+            ((at + 1).min(last), Some(OperatorRequest::MoveQueued { trial, earlier: false }))
         }
         (KeyCode::Char('x') | KeyCode::Delete, Some(trial)) => {
             if let Err(reason) = may_request(model) {
-                model.dialog = Some(Dialog::Queue { selected });
+                model.dialog = Some(Dialog::Queue { selected: Some(trial) });
                 return refused(model, "not removed", &reason);
             }
             model.dialog = Some(Dialog::Confirm(Question::RemoveQueued { trial }));
@@ -164,10 +165,10 @@ pub(super) fn queue_key(model: &mut Model, key: Key, selected: usize) -> Vec<Eff
                 Err(_) => "Up Down Home End",
             };
             unknown_key(model, key, keys);
-            (selected, None)
+            (at, None)
         }
     };
-    model.dialog = Some(Dialog::Queue { selected });
+    model.dialog = Some(Dialog::Queue { selected: trials.get(at).copied() });
     change.map_or_else(Vec::new, |change| request(model, change))
 }
 

@@ -28,7 +28,7 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
     }
     let action = match &dialog {
         Dialog::ArmingChecks { .. } => confirm::action_over_checks(model, key),
-        Dialog::Palette { input, selected } => lists::chosen_action(model, key, input.value(), *selected),
+        Dialog::Palette { selected, .. } => lists::chosen_action(model, key, *selected),
         Dialog::Details { .. } => lists::action_over_details(model, key),
         _ => None,
     };
