@@ -344,6 +344,42 @@ fn the_keys_act_on_the_trial_whose_details_are_shown() {
     assert_shows(console.said(), &["trial 1 waits for its verdict, but 0 is selected"]);
 }
 
+/// Regression: once a newer trial had come, the keys over the details acted on that one.
+#[test]
+fn the_keys_over_details_act_on_their_trial_when_a_newer_one_comes() {
+    for view in ["1", "2", "5"] {
+        let opened = || {
+            let mut console = Console::ready();
+            console.record(Record::Trial(trial(7, Some(Verdict::Accept), None)));
+            console.press(&[view, "Enter"]);
+            assert_shows(&console.screen(80, 24), &["Trial #7"]);
+            console.record(Record::Trial(trial(8, Some(Verdict::Accept), None)));
+            console
+        };
+        let mut console = opened();
+        console.press(&["m"]);
+        assert_shows(&console.screen(80, 24), &["Note on trial #7"]);
+        let mut console = opened();
+        console.press(&["f"]);
+        assert_shows(&console.screen(80, 24), &["Trial #7: accept becomes fall. Why?"]);
+        // The newer one waits for its verdict: no key judges it over the details of another.
+        let mut console = opened();
+        console.record(Record::Trial(trial(8, None, Some(Verdict::Accept))));
+        console.stage(ExperimentStage::Review, 8);
+        assert_eq!(console.requests(&["a"]), []);
+        assert_shows(console.said(), &["trial 8 waits for its verdict, but 7 is selected"]);
+    }
+    // A row that the filter leaves out.
+    let mut console = Console::ready();
+    console.judged(2);
+    console.press(&["2", "F"]);
+    assert_shows(&console.screen(120, 40), &["only accept (F)"]);
+    console.press(&["Enter", "Down"]);
+    assert_shows(&console.screen(80, 24), &["Trial #1"]);
+    console.press(&["m"]);
+    assert_shows(&console.screen(80, 24), &["Note on trial #1"]);
+}
+
 /// Regression: keys acted on a row that the filter left out.
 #[test]
 fn no_key_acts_on_a_row_that_the_filter_leaves_out() {

@@ -211,6 +211,31 @@ pub(super) fn action_over_details(model: &Model, key: Key) -> Option<Action> {
     }
 }
 
+/// Prepares an action over the details of a trial: it acts on that trial, as on its row of Trials, also where the view would act on a
+/// newer one that has come since.
+pub(super) fn act_on_shown(model: &mut Model, action: Action, trial: u32) {
+    let acts_on_trial = matches!(
+        action,
+        Action::Accept
+            | Action::Fall
+            | Action::Void
+            | Action::Rerun
+            | Action::Undo
+            | Action::HandValue
+            | Action::Note
+            | Action::Ghost
+            | Action::Copy
+    );
+    let meant = |model: &Model| model.trial_in_view().is_some_and(|row| row.trial == trial);
+    if acts_on_trial && !meant(model) {
+        (model.trial_table.selected, model.view) = (Some(trial), View::Trials);
+        if !meant(model) {
+            // The filter leaves it out.
+            (model.trial_table.filter, model.trial_table.best_only) = (None, false);
+        }
+    }
+}
+
 pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize) -> Vec<Effect> {
     let numbers = || model.session.trials.records.values().chain(model.later_trials()).map(|row| row.trial);
     let (neighbour, scroll) = match key.code() {

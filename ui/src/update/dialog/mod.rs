@@ -33,6 +33,9 @@ pub(super) fn key(model: &mut Model, dialog: Dialog, key: Key) -> KeyOutcome {
         _ => None,
     };
     if let Some(action) = action {
+        if let Dialog::Details { trial, .. } = dialog {
+            lists::act_on_shown(model, action, trial);
+        }
         // Nothing that is read changes: the key that closes the details would end the program if they were gone.
         if action == Action::Acknowledge && matches!(dialog, Dialog::Details { .. }) {
             model.dialog = Some(dialog);
