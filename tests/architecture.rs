@@ -36,7 +36,7 @@ const CONSOLE: [&[&str]; 12] = [
     &["model"],
     &["layout", "text", "draw"],
     &["legal"],
-    &["arming", "help"],
+    &["arming", "details", "help"],
     &["update", "view", "feed", "export", "terminal", "input"],
     &["picture"],
     &["app", "screenshot"],

@@ -561,3 +561,18 @@ fn the_selected_point_stays_selected_when_the_first_one_runs() {
     console.press(&["x"]);
     assert_shows(&console.next_step(), &["remove trial #7 from the queue"]);
 }
+
+/// Regression: the details ended after two pages, and after keys beyond the end as many of the other direction did nothing.
+#[test]
+fn the_end_of_long_details_is_reached() {
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note = "word ".repeat(600) + "amphibian";
+    console.record(Record::Trial(row));
+    console.press(&["2", "Enter"]);
+    console.press(&["PgDn"; 20]);
+    let end = console.screen(80, 24);
+    assert_shows(&end, &["amphibian", "rise, air"]);
+    console.press(&["PgUp"]);
+    assert_ne!(console.screen(80, 24), end);
+}

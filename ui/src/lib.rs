@@ -17,6 +17,7 @@ mod arming;
 pub mod cell_encoder;
 mod column;
 pub mod connection;
+mod details;
 mod draw;
 pub mod export;
 pub mod feed;

@@ -19,7 +19,6 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph};
 use tui_input::Input;
 
-use super::details::{details, rejudged};
 use super::draw::{number, scale, span, truncate};
 use super::questions::last_verdict_stays;
 use super::{log, questions, queue};
@@ -31,7 +30,7 @@ use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideFo
 use crate::text::range_example;
 use crate::theme::{Glyphs, Role, Theme};
 use crate::wrap::{wrap, wrap_all};
-use crate::{arming, help};
+use crate::{arming, details, help};
 
 /// Columns before the text of an action: its key and its name.
 const PALETTE_INDENT: usize = 26;
@@ -114,15 +113,7 @@ fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, 
 fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scroll: usize) {
     let Some(record) = model.as_recorded(trial) else { return };
     let width = area.width.min(MAX_WIDTH);
-    let inside = usize::from(width.saturating_sub(4));
-    let mut lines: Vec<Line> = Vec::new();
-    let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
-    let overrides = model.timeline.as_ref().map_or(&model.session.overrides, |timeline| &timeline.overrides);
-    for (name, value) in details(&model.session, &model.theme, record, overrides).into_iter().chain(rejudged(again)) {
-        // Long values continue on the next line.
-        let line = Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<15}")), Span::raw(value)]);
-        lines.extend(wrap(&line, inside, 15));
-    }
+    let lines = details::lines(model, trial, usize::from(width.saturating_sub(4))).unwrap_or_default();
     let at_playhead = model.session.trials.records.get(&trial);
     let time = if at_playhead == Some(record) { "" } else { ", at the end of the recording" };
     render_lines(frame, area, model, (&format!("Trial #{trial}{time}"), width, "PgUp PgDn Home End"), lines, scroll);

@@ -17,7 +17,6 @@ mod chart;
 mod compact;
 mod countdown;
 mod densities;
-mod details;
 mod dialogs;
 mod dots;
 mod drawing;

@@ -123,12 +123,3 @@ fn is_decided(session: &SessionModel) -> bool {
     let certain = |point: &PointRecord| point.confidence.is_some_and(|confidence| confidence >= 0.995);
     session.confirming().is_none() || session.trials.points.iter().any(certain)
 }
-
-/// The repeats of a trial's point in words; none where it ran once.
-pub fn repeats_of(session: &SessionModel, theme: &Theme, trial: u32) -> Option<String> {
-    let point = session.trials.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
-    let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", theme.plus_minus(), sd));
-    let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
-    let (stood, of, unit) = (point.without_fall, point.trials.len(), &session.info.unit);
-    Some(format!("{stood}/{of} landed, {:.4}{spread} {unit} ({})", point.mean, trials.join(" ")))
-}

@@ -18,8 +18,9 @@ use crate::update::navigate::move_by;
 use crate::update::perform::open_palette;
 use crate::update::request::{cancelled, refused, request, unknown_key};
 use crate::wrap::wrap_all;
+use crate::{details, help};
 
-/// Lines that a page of a trial's details moves by; there are never more than two pages of them.
+/// Lines that a page of a trial's details moves by.
 const DETAILS_PAGE: usize = 10;
 /// Lines that a page of a line of the log moves by.
 const LOG_PAGE: usize = 10;
@@ -240,8 +241,10 @@ pub(super) fn details_key(model: &mut Model, key: Key, trial: u32, scroll: usize
     let numbers = || model.session.trials.records.values().chain(model.later_trials()).map(|row| row.trial);
     let (neighbour, scroll) = match key.code() {
         KeyCode::PageUp => (None, scroll.saturating_sub(DETAILS_PAGE)),
-        // The drawing stops at the last line.
-        KeyCode::PageDown => (None, (scroll + DETAILS_PAGE).min(DETAILS_PAGE * 2)),
+        KeyCode::PageDown => {
+            let lines = details::lines(model, trial, dialog_columns(model)).map_or(0, |lines| lines.len());
+            (None, (scroll + DETAILS_PAGE).min(lines.saturating_sub(dialog_rows(model))))
+        }
         KeyCode::Up => (numbers().filter(|number| *number < trial).max(), 0),
         KeyCode::Down => (numbers().filter(|number| *number > trial).min(), 0),
         KeyCode::Home => (numbers().min(), 0),

@@ -1,21 +1,35 @@
-//! All details of one trial, for their dialog.
+//! All details of one trial: the lines of their dialog, which are drawn, and counted where keys scroll.
 
 use quadfrog::engine::{EstimateChange, RejudgedTrial};
 use quadfrog::trial::{
     Displacement, ExpectedResult, JudgedBy, JumpRow, Overrides, TrialRecord, Verdict, four_digits, six_digits,
 };
 
-use super::draw::{clock, falls_near, with_deviation};
-use super::points;
-use crate::model::session::SessionModel;
-use crate::theme::Theme;
+use ratatui::text::{Line, Span};
 
-pub fn details(
-    session: &SessionModel,
-    theme: &Theme,
-    trial: &TrialRecord,
-    overrides: &Overrides,
-) -> Vec<(String, String)> {
+use crate::draw::{clock, falls_near, span, with_deviation};
+use crate::model::Model;
+use crate::model::session::SessionModel;
+use crate::theme::{Role, Theme};
+use crate::wrap::wrap;
+
+/// Columns of a name.
+const NAME_WIDTH: usize = 15;
+
+/// Returns the details of a trial in lines of `width` columns; none of an unknown trial.
+pub fn lines(model: &Model, trial: u32, width: usize) -> Option<Vec<Line<'static>>> {
+    let record = model.as_recorded(trial)?;
+    let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
+    let overrides = model.timeline.as_ref().map_or(&model.session.overrides, |timeline| &timeline.overrides);
+    let rows = details(&model.session, &model.theme, record, overrides).into_iter().chain(rejudged(again));
+    let line = |(name, value): (String, String)| {
+        Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<NAME_WIDTH$}")), Span::raw(value)])
+    };
+    // Long values continue on the next line.
+    Some(rows.flat_map(|row| wrap(&line(row), width, NAME_WIDTH)).collect())
+}
+
+fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord, overrides: &Overrides) -> Vec<(String, String)> {
     let overrides = overrides.of(trial);
     let proposed = |name: &str| {
         let overridden = overrides.iter().find(|p| p.name == name);
@@ -70,7 +84,7 @@ pub fn details(
     }
     row("source", trial.origin());
     row("attempt", session.trials.attempt(trial).to_string());
-    if let Some(repeats) = points::repeats_of(session, theme, trial.trial) {
+    if let Some(repeats) = repeats_of(session, theme, trial.trial) {
         row("repeats", repeats);
     }
     if let Some(ran) = session.trials.ran.get(&trial.trial) {
@@ -149,8 +163,17 @@ pub fn details(
     rows
 }
 
+/// The repeats of a trial's point in words; none where it ran once.
+fn repeats_of(session: &SessionModel, theme: &Theme, trial: u32) -> Option<String> {
+    let point = session.trials.points.iter().find(|point| point.trials.contains(&trial) && point.trials.len() > 1)?;
+    let spread = point.deviation.map_or(String::new(), |sd| format!(" {} {:.4}", theme.plus_minus(), sd));
+    let trials: Vec<String> = point.trials.iter().map(|trial| format!("#{trial}")).collect();
+    let (stood, of, unit) = (point.without_fall, point.trials.len(), &session.info.unit);
+    Some(format!("{stood}/{of} landed, {:.4}{spread} {unit} ({})", point.mean, trials.join(" ")))
+}
+
 /// The new judgement of a trial, and the change of its estimate.
-pub fn rejudged(again: Option<&RejudgedTrial>) -> Vec<(String, String)> {
+fn rejudged(again: Option<&RejudgedTrial>) -> Vec<(String, String)> {
     let Some(RejudgedTrial { old, new, estimate, .. }) = again else { return Vec::new() };
     let number = |value: Option<f64>| value.map_or("none".to_owned(), |value| format!("{value:.4}"));
     let verdict = new.verdict.map_or("no verdict", |verdict| verdict.name());
