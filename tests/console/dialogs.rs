@@ -576,3 +576,31 @@ fn the_end_of_long_details_is_reached() {
     console.press(&["PgUp"]);
     assert_ne!(console.screen(80, 24), end);
 }
+
+/// Regression: texts with characters of two columns were cut without a sign.
+#[test]
+fn wide_characters_are_wrapped_and_cut_by_their_columns() {
+    let sentence = "机器人在垫子上滑倒了，因为电缆挡住了它的右后腿。".repeat(4);
+    let mut console = Console::ready();
+    let mut row = trial(0, Some(Verdict::Accept), None);
+    row.note.clone_from(&sentence);
+    console.record(Record::Trial(row));
+    let log = LogRecord { level: LogLevel::Warning, source: "操作员".into(), message: sentence.clone() };
+    console.record(Record::Log(log));
+    for (columns, rows) in [(80, 24), (120, 40)] {
+        console.update(Msg::Resize(columns, rows));
+        console.press(&["2", "Enter"]);
+        let words = words_of_the_dialog(&console.screen(columns, rows)).replace(' ', "");
+        assert!(words.contains(&sentence), "{words}");
+        console.press(&["Esc", "m"]);
+        let words = words_of_the_dialog(&console.screen(columns, rows)).replace(' ', "");
+        assert!(words.contains(&sentence), "{words}");
+        console.press(&["Esc", "6"]);
+        let screen = console.screen(columns, rows);
+        let line = line_with(&screen, "机 器 人");
+        assert!(line.trim_end().ends_with(".."), "{line}");
+        // The messages of both have the same column.
+        let column = |line: &str, text: &str| line.find(text).map(|at| line[..at].chars().count());
+        assert_eq!(column(&line, "机"), column(&line_with(&screen, "forward on go1"), "forward on go1"));
+    }
+}

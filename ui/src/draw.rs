@@ -10,12 +10,14 @@ use quadfrog::trial::{ExpectedResult, FallRisk, TrialRecord, Verdict};
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
 use crate::column::Column;
 use crate::model::Model;
 use crate::model::trials::measured;
 use crate::theme::{Role, Theme};
+pub use crate::wrap::columns;
 use crate::wrap::unbroken;
 
 pub fn span(theme: &Theme, role: Role, text: impl Into<String>) -> Span<'static> {
@@ -27,7 +29,7 @@ pub const NO_STATE: &str = "no state from the robot";
 
 /// Columns of a heading with both its texts.
 pub fn heading_width(title: &str, aside: &str) -> usize {
-    title.chars().count() + aside.chars().count() + 4
+    columns(title) + columns(aside) + 4
 }
 
 /// A heading with a line to the right edge; returns the area below it.
@@ -35,7 +37,7 @@ pub fn heading(frame: &mut Frame, area: Rect, theme: &Theme, title: &str, aside:
     let [top, rest] = Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]).areas(area);
     // Where there is no room for both, the title stays.
     let aside = if heading_width(title, aside) > usize::from(area.width) { "" } else { aside };
-    let used = title.chars().count() + aside.chars().count() + 2 + usize::from(!aside.is_empty());
+    let used = columns(title) + columns(aside) + 2 + usize::from(!aside.is_empty());
     let fill = theme.line().repeat(usize::from(area.width).saturating_sub(used));
     let mut spans = vec![span(theme, Role::Heading, title), Span::raw(" "), span(theme, Role::Quiet, fill)];
     if !aside.is_empty() {
@@ -88,14 +90,20 @@ pub fn clock_ms(time_ns: u64) -> String {
     format!("{}.{:03}", clock(time_ns), time_ns / 1_000_000 % 1000)
 }
 
-/// The text cut to a number of characters, ending in `..` where something is missing.
+/// The text cut to a number of columns, ending in `..` where something is missing.
 pub fn truncate(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
+    if columns(text) <= width {
         return text.to_owned();
     }
-    let mut short: String = text.chars().take(width.saturating_sub(2)).collect();
-    short.push_str("..");
-    short
+    let whole = Span::raw(text);
+    let mut room = width.saturating_sub(2);
+    let fits = |symbol: &&str| {
+        let left = room.checked_sub(columns(symbol));
+        room = left.unwrap_or(0);
+        left.is_some()
+    };
+    let short: String = whole.styled_graphemes(Style::new()).map(|cell| cell.symbol).take_while(fits).collect();
+    short + ".."
 }
 
 /// Removes the characters without a width that are not printed: a cell has them behind its own character.

@@ -1,19 +1,23 @@
 //! Lines that continue at a word, so that no sentence is cut.
 
 use ratatui::style::Style;
-use ratatui::text::{Line, Span};
+use ratatui::text::{Line, Span, StyledGrapheme};
 
 /// The text with spaces at which [`wrap`] does not break it; they are drawn as other spaces.
 pub fn unbroken(text: &str) -> String {
     text.replace(' ', "\u{a0}")
 }
 
-/// The line in pieces of at most `width` characters, broken at spaces. A word that is longer than a line is broken behind a `/`, and
+/// The columns that a text takes on the screen: two for each wide character, as of Chinese.
+pub fn columns(text: &str) -> usize {
+    Span::raw(text).width()
+}
+
+/// The line in pieces of at most `width` columns, broken at spaces. A word that is longer than a line is broken behind a `/`, and
 /// inside a part of a path only if that is longer than a line, too. Further
 /// pieces begin with `indent` spaces. Styles stay with their characters.
 pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
-    let cells: Vec<(char, Style)> =
-        line.spans.iter().flat_map(|span| span.content.chars().map(|c| (c, span.style))).collect();
+    let cells: Vec<StyledGrapheme> = line.spans.iter().flat_map(|span| span.styled_graphemes(Style::new())).collect();
     let width = width.max(1);
     let indent = if indent + 8 > width { 0 } else { indent };
     let mut pieces = Vec::new();
@@ -21,20 +25,21 @@ pub fn wrap(line: &Line, width: usize, indent: usize) -> Vec<Line<'static>> {
     while !rest.is_empty() || pieces.is_empty() {
         let before = if pieces.is_empty() { 0 } else { indent };
         let room = width - before;
-        let taken = match rest.get(room) {
+        // The cells that have room; at least one, so that a wide one in a single column ends the line.
+        let fit = within(rest, room).max(1);
+        let taken = match rest.get(fit) {
             None => rest.len(),
-            Some((' ', _)) => room,
+            Some(cell) if cell.symbol == " " => fit,
             // The break is after the last space; spaces at the begin of the line are no break.
             Some(_) => {
-                let first = rest.iter().position(|(c, _)| *c != ' ').unwrap_or(0);
-                let space = rest[..room].iter().rposition(|(c, _)| *c == ' ').filter(|at| *at > first);
-                let slash = || rest[..room].iter().rposition(|(c, _)| *c == '/').filter(|at| *at > first);
-                space.or_else(|| slash().map(|at| at + 1)).unwrap_or(room)
+                let first = rest.iter().position(|cell| cell.symbol != " ").unwrap_or(0);
+                let last = |text| rest[..fit].iter().rposition(|cell| cell.symbol == text).filter(|at| *at > first);
+                last(" ").or_else(|| last("/").map(|at| at + 1)).unwrap_or(fit)
             }
         };
         let (piece, after) = rest.split_at(taken);
         pieces.push(restyled(piece, before));
-        let spaces = after.iter().take_while(|(c, _)| *c == ' ').count();
+        let spaces = after.iter().take_while(|cell| cell.symbol == " ").count();
         rest = &after[spaces.min(after.len())..];
     }
     pieces
@@ -80,11 +85,20 @@ pub fn wrap_all(lines: &[Line], width: usize, indent: usize) -> Vec<Line<'static
     lines.iter().flat_map(|line| wrap(line, width, indent)).collect()
 }
 
-fn restyled(cells: &[(char, Style)], indent: usize) -> Line<'static> {
+/// The number of the first cells that `room` columns have room for.
+fn within(cells: &[StyledGrapheme], room: usize) -> usize {
+    let ends = cells.iter().scan(0, |end, cell| {
+        *end += columns(cell.symbol);
+        Some(*end)
+    });
+    ends.take_while(|end| *end <= room).count()
+}
+
+fn restyled(cells: &[StyledGrapheme], indent: usize) -> Line<'static> {
     let mut spans = if indent > 0 { vec![Span::raw(" ".repeat(indent))] } else { Vec::new() };
-    for run in cells.chunk_by(|a, b| a.1 == b.1) {
-        let text = run.iter().map(|(c, _)| if *c == '\u{a0}' { ' ' } else { *c });
-        spans.push(Span::styled(text.collect::<String>(), run[0].1));
+    for run in cells.chunk_by(|a, b| a.style == b.style) {
+        let text = run.iter().map(|cell| if cell.symbol == "\u{a0}" { " " } else { cell.symbol });
+        spans.push(Span::styled(text.collect::<String>(), run[0].style));
     }
     Line::from(spans)
 }

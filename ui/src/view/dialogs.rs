@@ -19,7 +19,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear, Paragraph};
 use tui_input::Input;
 
-use super::draw::{number, scale, span, truncate};
+use super::draw::{columns, number, scale, span, truncate};
 use super::questions::last_verdict_stays;
 use super::{log, questions, queue};
 use crate::action::Action;
@@ -206,7 +206,7 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
                 let others: usize = spans.iter().chain(&after).map(Span::width).sum();
                 let room = width.saturating_sub(others).max(VALUE_WIDTH);
                 // As wide as the number that it replaces, so that the line does not shift.
-                let typed = match form.replaces && input.value().chars().count() <= room {
+                let typed = match form.replaces && columns(input.value()) <= room {
                     true => vec![span(theme, Role::Selected, input.value())],
                     false => edited_within(theme, input, room),
                 };
@@ -248,8 +248,16 @@ fn edited(theme: &Theme, input: &Input) -> Vec<Span<'static>> {
 fn edited_within(theme: &Theme, input: &Input, room: usize) -> Vec<Span<'static>> {
     let text: Vec<char> = input.value().chars().collect();
     let at = input.cursor().min(text.len());
-    let first = (at + 1).saturating_sub(room);
-    let end = first.saturating_add(room).min(text.len());
+    let columns_of = |c: &char| columns(c.encode_utf8(&mut [0; 4]));
+    let mut used = text.get(at).map_or(1, columns_of);
+    let mut fits = |c: &&char| {
+        let columns = columns_of(c);
+        let fits = used + columns <= room;
+        used += if fits { columns } else { 0 };
+        fits
+    };
+    let first = at - text[..at].iter().rev().take_while(&mut fits).count();
+    let end = (at + 1 + text.iter().skip(at + 1).take_while(&mut fits).count()).min(text.len());
     let (cut_before, cut_behind) = (first > 0, at + 1 < end && end < text.len());
     let part = |from: usize, to: usize| text.get(from..to).unwrap_or_default().iter().collect::<String>();
     let rest = |cut: bool, sign: &'static str| span(theme, Role::Quiet, if cut { sign } else { "" });
@@ -463,7 +471,7 @@ fn render_lines(
     let scroll = scroll.min(lines.len().saturating_sub(room));
     let shown = format!("{}-{} of {}", scroll + 1, scroll + room, lines.len());
     // Within the corners and the spaces beside the title; the line below names the keys, too.
-    let fits = |title: &String| title.chars().count() + 4 <= usize::from(width.min(area.width));
+    let fits = |title: &String| columns(title) + 4 <= usize::from(width.min(area.width));
     let title = match lines.len() > room {
         true => Some(format!("{title} ({shown}, {keys})")).filter(fits).unwrap_or(format!("{title} ({shown})")),
         false => title.to_owned(),

@@ -4,7 +4,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::draw::{span, truncate};
+use super::draw::{columns as columns_of, span, truncate};
 use super::next_step::with_row;
 use crate::action::Action;
 use crate::model::dialog::Dialog;
@@ -22,11 +22,11 @@ pub(super) fn line_within(model: &Model, width: usize, view_is_shown: bool) -> L
     let mut next = with_row(model, view_is_shown);
     let columns = |(key, text): &(String, String)| key.chars().count() + text.chars().count() + 4;
     // In Trials the keys of the row are worth more than the words of the step.
-    let whole = 1 + next.lead.chars().count() + next.others.iter().map(columns).sum::<usize>();
+    let whole = 1 + columns_of(&next.lead) + next.others.iter().map(columns).sum::<usize>();
     if model.view == View::Trials && !next.short.is_empty() && whole > width {
         next.lead = std::mem::take(&mut next.short);
     }
-    let room = width.saturating_sub(next.lead.chars().count() + 1);
+    let room = width.saturating_sub(columns_of(&next.lead) + 1);
     let more = (model.keymap.key(Action::Help), "more".to_owned());
     let mut shown = next.others;
     let width_of = |shown: &[(String, String)]| shown.iter().map(columns).sum::<usize>();
@@ -64,7 +64,7 @@ pub(super) fn line_within(model: &Model, width: usize, view_is_shown: bool) -> L
 /// The step of a dialog within `width` columns: whole sentences after the first one go, of a question the last one, else those
 /// before the last one; then whole keys before the last one.
 fn without_parts(lead: &str, width: usize, asks: bool) -> String {
-    let fits = |text: &str| text.trim_end().chars().count() <= width;
+    let fits = |text: &str| columns_of(text.trim_end()) <= width;
     let mut sentences: Vec<&str> = lead.split_inclusive(". ").collect();
     while sentences.len() > 2 && !fits(&sentences.concat()) {
         sentences.remove(sentences.len() - if asks { 1 } else { 2 });

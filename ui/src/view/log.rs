@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, heading_width, span, truncate, wall_clock};
+use super::draw::{columns, heading, heading_width, span, truncate, wall_clock};
 use crate::action::Action;
 use crate::model::Model;
 use crate::model::log::LogLine;
@@ -107,10 +107,12 @@ fn line_of(model: &Model, line: &LogLine, selected: bool, width: usize) -> Line<
         LogLevel::Info => (" ", Role::Text),
     };
     let room = width.saturating_sub(time.chars().count() + 12);
+    let source = truncate(&line.source, 9);
+    let filling = 10_usize.saturating_sub(columns(&source));
     Line::from(vec![
         span(theme, if selected { Role::Selected } else { Role::Quiet }, time),
         span(theme, role, format!("{symbol} ")),
-        span(theme, Role::Quiet, format!("{:<9} ", truncate(&line.source, 9))),
+        span(theme, Role::Quiet, format!("{source}{:filling$}", "")),
         match line.level {
             LogLevel::Info => Span::raw(truncate(&line.text, room)),
             _ => span(theme, role, truncate(&line.text, room)),

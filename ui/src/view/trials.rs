@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{clock, heading, heading_width, measured_number, number, sign, span, truncate};
+use super::draw::{clock, columns, heading, heading_width, measured_number, number, sign, span, truncate};
 use crate::action::Action;
 use crate::column::Column;
 use crate::layout::first_row;
@@ -162,7 +162,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
 fn padded(text: &str, width: usize) -> String {
     let text = truncate(text, width);
     // The last column takes the rest of the line and needs no filling.
-    if width > 40 { text } else { format!("{text:<width$}") }
+    let filling = if width > 40 { 0 } else { width.saturating_sub(columns(&text)) };
+    text + &" ".repeat(filling)
 }
 
 /// The text in place of the rows: before the first trial, the keys of a trial.
