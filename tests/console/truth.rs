@@ -546,3 +546,31 @@ fn the_next_step_is_never_cut_at_80_columns() {
     }
     assert!(cut.is_empty(), "{cut:#?}");
 }
+
+/// Regression: while the robot was armed, Health showed the free space of the time before as the present one.
+#[test]
+fn the_disk_of_an_earlier_time_is_grey_and_says_when_it_was_measured() {
+    let mut console = Console::proposed();
+    at_time(&mut console, 192);
+    console.record(Record::ArmingChecks(vec![ArmingCheckRecord {
+        check: ArmingCheck::Disk,
+        found: "812 MB".into(),
+        needed: "at least 1000 MB".into(),
+        state: ArmingCheckState::Failed,
+    }]));
+    console.press(&["5"]);
+    for (mode, past) in [(Mode::Disarmed, false), (Mode::Ready, true), (Mode::Disarmed, false)] {
+        console.mode(mode);
+        for (columns, rows) in [(80, 24), (120, 40)] {
+            let screen = console.screen(columns, rows);
+            let line = line_with(&screen, "disk  ");
+            assert_eq!(line.contains("812 MB at ") && line.contains(":12"), past, "{mode:?}\n{screen}");
+            assert_eq!(line.contains("812 MB !"), !past, "{mode:?}\n{screen}");
+            let row = screen.lines().position(|line| line.starts_with("disk  ")).expect("the disk") as u16;
+            let buffer = console.draw(columns, rows);
+            let column = (0..columns).find(|x| buffer[(*x, row)].symbol() == "8").expect("its value");
+            let warning = console.model.theme.style(Role::Warning).fg;
+            assert_eq!(Some(buffer[(column, row)].fg) == warning, !past, "{mode:?}");
+        }
+    }
+}

@@ -153,6 +153,6 @@ fn result(model: &Model) -> String {
 }
 
 /// The time of the checks once the robot is armed; none of checks that have not been.
-fn checked_at(model: &Model) -> Option<String> {
+pub fn checked_at(model: &Model) -> Option<String> {
     model.arming_checks_are_past().then(|| wall_clock(model, model.session.arming_checked_ns))
 }

@@ -1,7 +1,7 @@
 //! View 5, Health: loop timing, recorder, link, motors, battery, arming checks.
 
 use quadfrog::recording::live::LiveStatus;
-use quadfrog::recording::record::HealthLimits;
+use quadfrog::recording::record::{ArmingCheckRecord, HealthLimits};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, JOINTS, LinkStatus, joint_name};
 use quadfrog::telemetry::ArmingCheck;
@@ -74,10 +74,12 @@ struct HealthRow {
     beyond: bool,
     /// Left out where it has no room, unless it is beyond its limit.
     detail: bool,
+    /// Whether it is of an earlier time: grey.
+    past: bool,
 }
 
 fn row(name: &str, value: String, beyond: bool) -> HealthRow {
-    HealthRow { name: name.to_owned(), value, beyond, detail: false }
+    HealthRow { name: name.to_owned(), value, beyond, detail: false, past: false }
 }
 
 fn detail(name: &str, value: String, beyond: bool) -> HealthRow {
@@ -88,10 +90,11 @@ fn detail(name: &str, value: String, beyond: bool) -> HealthRow {
 fn lines(model: &Model, width: u16, name_width: usize, rows: &[HealthRow]) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let line = |row: &HealthRow| {
-        let HealthRow { name, value, beyond, .. } = row;
-        let value = match beyond {
-            true => span(theme, Role::Warning, format!("{value} !")),
-            false => Span::raw(value.clone()),
+        let HealthRow { name, value, beyond, past, .. } = row;
+        let value = match (past, beyond) {
+            (true, _) => span(theme, Role::Quiet, value.as_str()),
+            (false, true) => span(theme, Role::Warning, format!("{value} !")),
+            (false, false) => Span::raw(value.clone()),
         };
         Line::from(vec![span(theme, Role::Quiet, format!("{name:<name_width$}")), value])
     };
@@ -207,7 +210,6 @@ fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
     // The present one of several files.
     let present = model.recorder.as_ref().map(|status| status.file.display().to_string());
     let file = present.filter(|file| !file.is_empty()).unwrap_or_else(|| recording.clone());
-    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
     let counters = &model.snapshot.counters;
     // The end of the path identifies the study and the recording. Where both have no room in a row, the folder has one of its own.
     let name = |path: &str| match path.rsplit_once('/') {
@@ -235,7 +237,7 @@ fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
             Some(status) => row("written", written(status, model.snapshot.tick.time_ns), false),
             None => row("written", "-".to_owned(), false),
         },
-        disk.map_or(row("disk", "-".to_owned(), false), |d| row("disk", d.found.clone(), !d.state.allows())),
+        disk_row(model),
         row("not recorded", counted(counters.ticks_not_recorded as usize, "tick"), counters.ticks_not_recorded > 0),
         detail("not shown", counted(counters.ticks_not_shown as usize, "tick"), false),
         detail("refused", counted(counters.commands_refused as usize, "command"), false),
@@ -247,6 +249,16 @@ fn recorder_rows(model: &Model, width: usize) -> Vec<HealthRow> {
         rows.push(detail("observers", format!("{observers} with quadfrog attach"), false));
     }
     rows
+}
+
+/// The free space of the disk, from the newest arming checks; grey once the robot is armed.
+fn disk_row(model: &Model) -> HealthRow {
+    let disk = model.session.arming_checks.iter().find(|item| item.check == ArmingCheck::Disk);
+    let Some(ArmingCheckRecord { found, state, .. }) = disk else { return row("disk", "-".to_owned(), false) };
+    match arming::checked_at(model) {
+        Some(at) => HealthRow { past: true, ..row("disk", format!("{found} at {at}"), false) },
+        None => row("disk", found.clone(), !state.allows()),
+    }
 }
 
 fn robot_rows(model: &Model) -> Vec<HealthRow> {
