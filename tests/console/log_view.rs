@@ -149,3 +149,26 @@ fn the_log_of_the_program_has_the_time_of_day() {
     assert!((shown - before).rem_euclid(day) <= (after - before).rem_euclid(day), "{line}: {before} to {after}");
     assert!(session.quit().success());
 }
+
+/// Regression: each new line that the search left out moved a log that was scrolled back.
+#[test]
+fn a_scrolled_log_stays_on_its_line_when_a_line_that_it_leaves_out_comes() {
+    let mut console = logged(&["frog one", "frog two", "frog three"]);
+    console.press(&["/"]);
+    console.enter("frog");
+    console.press(&["Enter", "Up"]);
+    let log = |console: &mut Console, text: &str| {
+        let (level, source) = (LogLevel::Warning, "test".into());
+        console.record(Record::Log(LogRecord { level, source, message: text.into() }));
+    };
+    let opened = |console: &mut Console| {
+        console.press(&["Enter"]);
+        let screen = console.screen(120, 40);
+        console.press(&["Esc"]);
+        screen
+    };
+    log(&mut console, "toad");
+    assert_shows(&line_with(&opened(&mut console), "│ frog"), &["frog two"]);
+    log(&mut console, "frog four");
+    assert_shows(&line_with(&opened(&mut console), "│ frog"), &["frog two"]);
+}

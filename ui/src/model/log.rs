@@ -57,10 +57,19 @@ impl LogView {
 
     /// Returns the lines that pass the filter, oldest first.
     pub fn lines<'a>(&'a self, log: &'a SessionLog) -> impl DoubleEndedIterator<Item = &'a LogLine> + 'a {
+        log.lines.iter().filter(self.filter())
+    }
+
+    /// Returns whether a line passes the filter.
+    pub fn shows(&self, line: &LogLine) -> bool {
+        self.filter()(&line)
+    }
+
+    fn filter(&self) -> impl Fn(&&LogLine) -> bool + '_ {
         let search = self.search.to_lowercase();
-        log.lines.iter().filter(move |line| {
+        move |line| {
             self.level.is_none_or(|level| line.level >= level)
                 && (search.is_empty() || line.text.to_lowercase().contains(&search) || line.source.contains(&search))
-        })
+        }
     }
 }

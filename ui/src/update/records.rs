@@ -403,9 +403,10 @@ pub(super) fn show_reason_again(model: &mut Model) {
 }
 
 fn log(model: &mut Model, time_ns: u64, level: LogLevel, source: &str, text: String, marker: bool) {
-    model.session.log.push(LogLine { time_ns, level, source: source.to_owned(), text, marker });
+    let line = LogLine { time_ns, level, source: source.to_owned(), text, marker };
     // A reader who has scrolled back stays on the same lines.
-    if model.log_view.back > 0 {
+    if model.log_view.back > 0 && model.log_view.shows(&line) {
         model.log_view.back += 1;
     }
+    model.session.log.push(line);
 }
