@@ -22,7 +22,7 @@ use no_alloc::without_allocation;
 use quadfrog::config::Config;
 use quadfrog::realtime::thread::pace;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
-use quadfrog::robot::go2::dds::Participant;
+use quadfrog::robot::go2::dds::{Participant, TopicType};
 use quadfrog::robot::hardware::{DampingRoute, Network};
 use quadfrog::robot::{JointCommand, LinkStatus, Robot, RobotState};
 use quadfrog::sim::emulator::{Emulator, EmulatorFault, EmulatorHandle};
@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A domain of its own for each test, so that they do not hear each other. Their ports lie below those of outgoing connections.
 fn domain() -> u16 {
     static NEXT: AtomicU16 = AtomicU16::new(0);
-    10 + (std::process::id() % 10) as u16 * 8 + NEXT.fetch_add(1, Ordering::Relaxed)
+    10 + (std::process::id() % 6) as u16 * 15 + NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 fn files() -> RobotFiles {
@@ -220,7 +220,7 @@ fn commands_of_other_programs_are_counted() {
     tick(&mut *robot, 500, None);
     let before = tick(&mut *robot, 10, None).1.foreign_commands;
     let guard = Participant::join(domain, Ipv4Addr::LOCALHOST).unwrap();
-    let writer = guard.writer(&quadfrog::robot::go2::dds::TopicType::low_command()).unwrap();
+    let writer = guard.writer(&TopicType::low_command()).unwrap();
     let commands = emulated.handle.status().commands;
     let begun = Instant::now();
     while emulated.handle.status().commands < commands + 100 {
@@ -233,6 +233,27 @@ fn commands_of_other_programs_are_counted() {
     let Some(peer) = Peer::start("commander", domain, 8) else { return };
     tick_until(&mut *robot, None, |link| link.foreign_commands > before + 20);
     assert!(peer.counts()["sent"].as_u64().unwrap() > 100);
+}
+
+/// Regression: the position of the first state was used without an end. If states alone fail, the services release a robot that a
+/// person may have raised.
+#[test]
+fn a_robot_whose_states_end_keeps_its_controller() {
+    for fault in [EmulatorFault::Loss(100.0), EmulatorFault::Repeat] {
+        let domain = domain();
+        let emulated = Emulated::start(domain);
+        let mut inject = |step: &str| {
+            if step == "the robot is to lie down" {
+                emulated.handle.apply(fault);
+            }
+        };
+        let error = network(domain, 1).take_over(&lying().lying_position, &mut inject).unwrap_err().to_string();
+        assert!(error.contains("no state of the robot for"), "{error}");
+        emulated.handle.apply(EmulatorFault::Clear);
+        let commands = emulated.handle.status().commands;
+        std::thread::sleep(Duration::from_millis(500));
+        assert!(emulated.handle.status().commands > commands + 50, "its own controller commands");
+    }
 }
 
 /// Losses and damage of the network are counted as the Go1's; a robot that restarts is seen.

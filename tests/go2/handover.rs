@@ -19,6 +19,10 @@ struct Services {
     release_code: i32,
     lies_down: bool,
     position_rad: Option<Joints>,
+    /// Time of the first advance without a fresh state, and of the first with one again.
+    without_states_ms: std::ops::Range<u64>,
+    /// The release after which a person raises the robot; its requests are lost.
+    raised_after_release: bool,
     /// Requests that arrived: service and function.
     arrived: Vec<(&'static str, i64)>,
     /// Released while the robot did not lie.
@@ -34,6 +38,8 @@ impl Services {
             release_code: 0,
             lies_down: true,
             position_rad: Some(STANDING),
+            without_states_ms: 0..0,
+            raised_after_release: false,
             arrived: Vec::new(),
             dropped: false,
         }
@@ -45,6 +51,11 @@ impl Services {
             return None;
         }
         let ServiceRequest { service, message } = request;
+        if self.raised_after_release && message.api == motion_switcher::RELEASE_MODE {
+            self.dropped |= self.position_rad != Some(LYING);
+            self.position_rad = Some(STANDING);
+            return None;
+        }
         self.arrived.push((service, message.api));
         let mut response = ResponseMessage {
             id: message.id,
@@ -83,7 +94,8 @@ fn run(services: &mut Services) -> (HandoverStatus, u64) {
             handover.answer(now_ms, service, &ResponseMessage { api: 77, ..response.clone() });
             handover.answer(now_ms, service, &response);
         }
-        if let Some(request) = handover.advance(now_ms, services.position_rad.as_ref()) {
+        let has_states = !services.without_states_ms.contains(&now_ms);
+        if let Some(request) = handover.advance(now_ms, services.position_rad.as_ref().filter(|_| has_states)) {
             assert!(!ids.contains(&request.message.id), "an identity is used once");
             ids.push(request.message.id);
             late.extend(services.serve(&request).map(|response| (now_ms + 20, request.service, response)));
@@ -140,4 +152,63 @@ fn each_cause_of_a_failure_is_named() {
     assert!(error.contains("request 1003 with the code 7008"), "{error}");
     let error = failure(Services { deaf_releases: 9, ..Services::new("advanced") });
     assert!(error.contains("\"advanced\" is still active after 3 releases"), "{error}");
+}
+
+/// Regression: the position of the first state was used without an end, so that a robot that a person had raised was released.
+#[test]
+fn without_fresh_states_the_robot_is_not_released() {
+    let lying = || Services { position_rad: Some(LYING), ..Services::new("normal") };
+    // After the first state, and while the robot lies down: its second without a move is not complete.
+    for end_ms in [10, 60, 500, 1000] {
+        let mut services = Services { without_states_ms: end_ms..u64::MAX, ..lying() };
+        let (end, ms) = run(&mut services);
+        let HandoverStatus::Failed(error) = end else { panic!("states end at {end_ms} ms: {end:?}") };
+        assert!(error.to_string().contains("no state of the robot for"), "{error}");
+        assert!(!services.arrived.contains(&RELEASE) && (10_000..12_000).contains(&ms), "{:?}", services.arrived);
+    }
+    // A gap: the robot may have been moved in it, and lies for one more second.
+    let mut services = Services { without_states_ms: 500..800, ..lying() };
+    let (end, ms) = run(&mut services);
+    assert_eq!(end, HandoverStatus::Done(Some("normal".to_owned())));
+    assert!((3800..4800).contains(&ms) && !services.dropped, "{ms} ms");
+}
+
+/// Regression: a release without a response was repeated for 5 s, whatever the robot did meanwhile.
+#[test]
+fn a_release_is_not_repeated_on_a_robot_that_was_raised_or_is_not_seen() {
+    let mut services = Services { raised_after_release: true, ..Services::new("normal") };
+    let (end, _) = run(&mut services);
+    let HandoverStatus::Failed(error) = end else { panic!("{end:?}") };
+    assert!(error.to_string().contains("the robot does not lie: FR_hip"), "{error}");
+    assert!(!services.dropped && !services.arrived.contains(&RELEASE), "{:?}", services.arrived);
+    // The release is due at 1060 ms; the states end in that moment.
+    let without_states_ms = 1060..u64::MAX;
+    let mut services = Services { position_rad: Some(LYING), without_states_ms, ..Services::new("normal") };
+    let (end, _) = run(&mut services);
+    let HandoverStatus::Failed(error) = end else { panic!("{end:?}") };
+    assert!(error.to_string().contains("no state of the robot for"), "{error}");
+    assert!(!services.arrived.contains(&RELEASE), "{:?}", services.arrived);
+}
+
+/// A program that was stopped finds the states of the time before: it does not know what happened since.
+#[test]
+fn the_time_of_a_program_that_was_stopped_is_not_the_time_of_a_robot_that_lies() {
+    let mut handover = Handover::begin(0, &LYING, 1000);
+    let mut answered = None;
+    let mut now_ms = 0;
+    let mut releases_at_ms = Vec::new();
+    for step in 0..300 {
+        // 60 s pass in one step.
+        now_ms += if step == 50 { 60_000 } else { 10 };
+        if let Some((service, response)) = answered.take() {
+            handover.answer(now_ms, service, &response);
+        }
+        if let Some(request) = handover.advance(now_ms, Some(&LYING)) {
+            if request.message.api == motion_switcher::RELEASE_MODE {
+                releases_at_ms.push(now_ms);
+            }
+            answered = Services::new("ai").serve(&request).map(|response| (request.service, response));
+        }
+    }
+    assert!(matches!(releases_at_ms[..], [ms] if ms >= 61_490), "{releases_at_ms:?}");
 }

@@ -1,7 +1,8 @@
 //! Takes the robot over from its own controller, in the order of Unitree's example (`docs/go2-wire.md`, section 6): states
 //! arrive, the robot lies, the active controller is read, released, and read again until there is none.
 //!
-//! No DDS and no clock here: the caller gives the time, the newest joint positions and the responses, and sends the requests.
+//! No DDS and no clock here: the caller gives the time, the joint positions of a fresh state and the responses, and sends the
+//! requests. The release needs states at every moment: an old one does not show that a person has raised the robot.
 //! Every request is repeated until it is answered, because the first one after the start may be lost. A repetition has an
 //! identity of its own, so a late response to an earlier one is not taken for the answer of a later step.
 
@@ -17,6 +18,8 @@ const UNANSWERED_MS: u64 = 5000;
 const NO_STATE_MS: u64 = 12_000;
 /// Time that the robot may take to lie down, ms.
 const LIE_DOWN_MS: u64 = 10_000;
+/// Age beyond which a state is not fresh any more, ms: dozens of the robot's periods of 1 to 2 ms, and too short to lift the robot.
+pub const FRESH_MS: u64 = 100;
 /// Time that the robot must lie still before its controller is released, ms.
 const LIES_MS: u64 = 1000;
 /// Wait between a release and the next reading of the active controller, ms; 1 to 5 s in Unitree's example.
@@ -108,10 +111,8 @@ enum Step {
         sent_ms: Option<u64>,
         first_id: i64,
     },
-    /// The robot lies down; `lies_since_ms` is the time since which it lies.
     LieDown {
         since_ms: u64,
-        lies_since_ms: Option<u64>,
     },
     Settle {
         since_ms: u64,
@@ -129,6 +130,10 @@ pub struct Handover {
     releases: u32,
     /// First controller that was found active.
     own_controller: Option<String>,
+    /// Time of the last advance with a fresh state; at first the begin.
+    seen_ms: u64,
+    /// Time since which every state shows a robot that lies.
+    lies_since_ms: Option<u64>,
 }
 
 impl Handover {
@@ -141,6 +146,8 @@ impl Handover {
             next_id: first_id,
             releases: 0,
             own_controller: None,
+            seen_ms: now_ms,
+            lies_since_ms: None,
         }
     }
 
@@ -156,9 +163,11 @@ impl Handover {
         }
     }
 
-    /// Advances to `now_ms` with the joint positions of the newest state, none before the first; returns the request to send.
+    /// Advances to `now_ms` with the joint positions of the newest state, none if it is older than [`FRESH_MS`]; returns the
+    /// request to send.
     pub fn advance(&mut self, now_ms: u64, joint_position_rad: Option<&Joints>) -> Option<ServiceRequest> {
-        match &mut self.step {
+        self.watch(now_ms, joint_position_rad);
+        match &self.step {
             Step::AwaitState { since_ms } => {
                 let after_ms = now_ms.saturating_sub(*since_ms);
                 if joint_position_rad.is_some() {
@@ -170,32 +179,24 @@ impl Handover {
             }
             Step::Request { function, since_ms, sent_ms, .. } => {
                 let (function, after_ms) = (*function, now_ms.saturating_sub(*since_ms));
+                let is_due = sent_ms.is_none_or(|sent_ms| now_ms.saturating_sub(sent_ms) >= REPEAT_MS);
                 if after_ms >= UNANSWERED_MS {
-                    let ServiceRequest { service, message } = function.request(0);
-                    self.fail(HandoverError::Unanswered { service, api: message.api, after_ms });
+                    self.fail_unanswered(function, now_ms, after_ms, joint_position_rad);
                     return None;
                 }
-                if sent_ms.is_some_and(|sent_ms| now_ms.saturating_sub(sent_ms) < REPEAT_MS) {
+                if !is_due || function == Function::ReleaseMode && !self.may_release(now_ms, joint_position_rad) {
                     return None;
                 }
-                *sent_ms = Some(now_ms);
-                let id = self.next_id;
-                self.next_id += 1;
-                Some(function.request(id))
+                self.send(function, now_ms)
             }
-            Step::LieDown { since_ms, lies_since_ms } => {
+            Step::LieDown { since_ms } => {
                 let after_ms = now_ms.saturating_sub(*since_ms);
-                let (joint, off_rad) = farthest(joint_position_rad?, &self.lying_rad);
-                // A position that is not finite is none of a lying robot.
-                if off_rad <= LYING_RAD {
-                    let lies_since_ms = *lies_since_ms.get_or_insert(now_ms);
-                    if now_ms.saturating_sub(lies_since_ms) >= LIES_MS {
-                        self.request(Function::ReleaseMode, now_ms);
-                    }
-                } else {
-                    *lies_since_ms = None;
-                    if after_ms >= LIE_DOWN_MS {
-                        self.fail(HandoverError::NotLying { joint: joint_name(joint), off_rad });
+                if self.lies_long_enough(now_ms) {
+                    self.request(Function::ReleaseMode, now_ms);
+                } else if after_ms >= LIE_DOWN_MS {
+                    match joint_position_rad {
+                        None => self.fail_without_state(now_ms),
+                        Some(position_rad) => self.fail_unless_lying(position_rad),
                     }
                 }
                 None
@@ -235,7 +236,10 @@ impl Handover {
                 }
             },
             // A controller without this function refuses it; the joints decide whether the robot lies.
-            Function::StandDown => self.step = Step::LieDown { since_ms: now_ms, lies_since_ms: None },
+            Function::StandDown => {
+                self.lies_since_ms = None;
+                self.step = Step::LieDown { since_ms: now_ms };
+            }
             Function::ReleaseMode if response.code != 0 => self.fail(refused()),
             Function::ReleaseMode => {
                 self.releases += 1;
@@ -244,21 +248,76 @@ impl Handover {
         }
     }
 
+    /// Notes since when the robot lies. A gap in the states, or in the calls of a program that was stopped, begins anew: nothing is
+    /// known about the robot in it.
+    fn watch(&mut self, now_ms: u64, joint_position_rad: Option<&Joints>) {
+        if now_ms.saturating_sub(self.seen_ms) > FRESH_MS {
+            self.lies_since_ms = None;
+        }
+        let lies = joint_position_rad.is_some_and(|position_rad| off_lying(position_rad, &self.lying_rad).is_none());
+        self.lies_since_ms = lies.then(|| self.lies_since_ms.unwrap_or(now_ms));
+        if joint_position_rad.is_some() {
+            self.seen_ms = now_ms;
+        }
+    }
+
+    fn lies_long_enough(&self, now_ms: u64) -> bool {
+        self.lies_since_ms.is_some_and(|since_ms| now_ms.saturating_sub(since_ms) >= LIES_MS)
+    }
+
+    /// Whether the robot lies, now and for long enough; the handover fails if it is seen not to lie.
+    fn may_release(&mut self, now_ms: u64, joint_position_rad: Option<&Joints>) -> bool {
+        if let Some(position_rad) = joint_position_rad {
+            self.fail_unless_lying(position_rad);
+        }
+        self.lies_long_enough(now_ms)
+    }
+
     fn request(&mut self, function: Function, now_ms: u64) {
         self.step = Step::Request { function, since_ms: now_ms, sent_ms: None, first_id: self.next_id };
+    }
+
+    fn send(&mut self, function: Function, now_ms: u64) -> Option<ServiceRequest> {
+        if let Step::Request { sent_ms, .. } = &mut self.step {
+            *sent_ms = Some(now_ms);
+        }
+        let id = self.next_id;
+        self.next_id += 1;
+        Some(function.request(id))
     }
 
     fn fail(&mut self, error: HandoverError) {
         self.step = Step::Failed(error);
     }
+
+    fn fail_without_state(&mut self, now_ms: u64) {
+        self.fail(HandoverError::NoState { after_ms: now_ms.saturating_sub(self.seen_ms) });
+    }
+
+    fn fail_unless_lying(&mut self, position_rad: &Joints) {
+        if let Some((joint, off_rad)) = off_lying(position_rad, &self.lying_rad) {
+            self.fail(HandoverError::NotLying { joint: joint_name(joint), off_rad });
+        }
+    }
+
+    /// A release without a response: without states it was not sent, and the service is not the cause.
+    fn fail_unanswered(&mut self, function: Function, now_ms: u64, after_ms: u64, joint_position_rad: Option<&Joints>) {
+        if function == Function::ReleaseMode && joint_position_rad.is_none() {
+            return self.fail_without_state(now_ms);
+        }
+        let ServiceRequest { service, message } = function.request(0);
+        self.fail(HandoverError::Unanswered { service, api: message.api, after_ms });
+    }
 }
 
-/// Returns the joint that is farthest from `pose`, and its distance, rad; infinite if a position is not finite.
-fn farthest(position_rad: &Joints, pose: &Joints) -> (usize, f64) {
+/// Returns the joint that is farthest from the lying pose, and its distance, rad, if the robot does not lie. The distance is infinite
+/// if a position is not finite.
+pub fn off_lying(position_rad: &Joints, lying_rad: &Joints) -> Option<(usize, f64)> {
     let off = |joint: usize| {
-        let off_rad = (position_rad[joint] - pose[joint]).abs();
+        let off_rad = (position_rad[joint] - lying_rad[joint]).abs();
         if off_rad.is_finite() { off_rad } else { f64::INFINITY }
     };
     // The first of equal ones.
-    (0..JOINTS).rev().map(|joint| (joint, off(joint))).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+    let farthest = (0..JOINTS).rev().map(|joint| (joint, off(joint))).max_by(|a, b| a.1.total_cmp(&b.1));
+    farthest.filter(|(_, off_rad)| *off_rad > LYING_RAD)
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::dds::{DdsError, FoundEndpoint, Participant, TopicReader, TopicType, TopicWriter};
-use super::handover::{Handover, HandoverError, HandoverStatus, ServiceRequest};
+use super::handover::{FRESH_MS, Handover, HandoverError, HandoverStatus, ServiceRequest};
 use super::message::{ResponseMessage, StateMessage, motion_switcher, sport};
 use crate::robot::{JOINTS, Joints};
 
@@ -60,6 +60,43 @@ fn first_id() -> i64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(1, |time| time.as_nanos() as i64)
 }
 
+/// The robot's states, and the newest of them.
+struct States {
+    reader: TopicReader,
+    newest: Option<NewestState>,
+}
+
+/// Joint positions of a state, and the time at which it came.
+struct NewestState {
+    received: Instant,
+    tick: u32,
+    position_rad: Joints,
+}
+
+impl States {
+    fn open(participant: &Participant) -> Result<States, DdsError> {
+        Ok(States { reader: participant.reader(&TopicType::low_state())?, newest: None })
+    }
+
+    /// Waits for states, at most [`LOOK`], and takes all that came. One that repeats the robot's time is not a new one.
+    fn receive(&mut self) {
+        self.reader.wait(LOOK);
+        while let Some(sample) = self.reader.take() {
+            let Ok(state) = StateMessage::decode(&sample.payload) else { continue };
+            if self.newest.as_ref().is_none_or(|newest| newest.tick != state.tick) {
+                let position_rad = std::array::from_fn::<f64, JOINTS, _>(|i| state.motor[i].position.into());
+                self.newest = Some(NewestState { received: Instant::now(), tick: state.tick, position_rad });
+            }
+        }
+    }
+
+    /// Joint positions of the newest state; none if it is not fresh.
+    fn position_rad(&self) -> Option<&Joints> {
+        let fresh = Duration::from_millis(FRESH_MS);
+        self.newest.as_ref().filter(|newest| newest.received.elapsed() <= fresh).map(|newest| &newest.position_rad)
+    }
+}
+
 /// Takes the robot over: waits for states, lets it lie down, and releases its own controller. `lying_rad` is the lying pose;
 /// `reliable` whether commands will be sent reliably; `report` receives each new step, and once, after 2 s without states, what was found in the domain instead. Returns the name of the released controller; none if none was active.
 ///
@@ -71,32 +108,27 @@ pub fn take_over(
     reliable: bool,
     report: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, TakeoverError> {
-    let mut states = participant.reader(&TopicType::low_state())?;
+    let mut states = States::open(participant)?;
     let mut services =
         [Service::open(participant, motion_switcher::SERVICE)?, Service::open(participant, sport::SERVICE)?];
     let begun = Instant::now();
     let mut handover = Handover::begin(0, lying_rad, first_id());
-    let (mut position_rad, mut reported, mut is_late) = (None, None, false);
+    let (mut reported, mut is_late) = (None, false);
     loop {
-        states.wait(LOOK);
-        while let Some(sample) = states.take() {
-            if let Ok(state) = StateMessage::decode(&sample.payload) {
-                position_rad = Some(std::array::from_fn::<f64, JOINTS, _>(|i| state.motor[i].position.into()));
-            }
-        }
+        states.receive();
         let now_ms = begun.elapsed().as_millis() as u64;
         for service in &mut services {
             while let Some(response) = service.response() {
                 handover.answer(now_ms, service.name, &response);
             }
         }
-        if let Some(ServiceRequest { service, message }) = handover.advance(now_ms, position_rad.as_ref()) {
+        if let Some(ServiceRequest { service, message }) = handover.advance(now_ms, states.position_rad()) {
             for found in services.iter().filter(|found| found.name == service) {
                 // A lost request is repeated.
                 let _ = found.requests.write(&message.encode());
             }
         }
-        if position_rad.is_none() && begun.elapsed() > DISCOVERY && !is_late {
+        if states.newest.is_none() && begun.elapsed() > DISCOVERY && !is_late {
             is_late = true;
             report(&format!("no state yet: {}", found_for(&TopicType::low_state(), &participant.writers(), "writes")));
         }
