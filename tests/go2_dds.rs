@@ -235,6 +235,48 @@ fn commands_of_other_programs_are_counted() {
     assert!(peer.counts()["sent"].as_u64().unwrap() > 100);
 }
 
+/// Regression: a second console was invisible to the first, because its damping has the bytes of the guard's.
+#[test]
+fn two_consoles_that_damp_one_robot_count_each_other() {
+    let domain = domain();
+    let (mut first, _) = network(domain, 1).open(3.0).unwrap();
+    let (mut second, _) = network(domain, 1).open(3.0).unwrap();
+    let damping = Some(JointCommand::damping(3.0));
+    let begun = Instant::now();
+    loop {
+        let links = [&mut first, &mut second].map(|robot| tick(&mut **robot, 1, damping).1);
+        if links.iter().all(|link| link.foreign_commands > 100) {
+            return;
+        }
+        assert!(begun.elapsed() < PATIENCE, "{links:?}");
+    }
+}
+
+/// A console that hangs for a moment is damped by its guard, which is no other program.
+#[test]
+fn the_guards_commands_in_a_silence_are_not_counted() {
+    let domain = domain();
+    let (mut robot, (route, _)) = network(domain, 1).open(3.0).unwrap();
+    let DampingRoute::Go2 { command, .. } = route else { panic!("{route:?}") };
+    let damping = Some(JointCommand::damping(3.0));
+    let guard = Participant::join(domain, Ipv4Addr::LOCALHOST).unwrap();
+    let writer = guard.writer(&TopicType::low_command()).unwrap();
+    // While the console writes, the same bytes are another program's: the two have found each other.
+    let begun = Instant::now();
+    while tick(&mut *robot, 10, damping).1.foreign_commands < 10 {
+        writer.write(&command).unwrap();
+        assert!(begun.elapsed() < PATIENCE);
+    }
+    let before = tick(&mut *robot, 300, damping).1.foreign_commands;
+    std::thread::sleep(Duration::from_millis(50));
+    for _ in 0..100 {
+        writer.write(&command).unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let after = tick(&mut *robot, 500, damping).1.foreign_commands;
+    assert_eq!(after, before);
+}
+
 /// Regression: the position of the first state was used without an end. If states alone fail, the services release a robot that a
 /// person may have raised.
 #[test]

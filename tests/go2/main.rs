@@ -3,3 +3,4 @@
 mod handover;
 mod link;
 mod network;
+mod own_writes;

@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use nix::time::{ClockId, clock_gettime};
 use rustdds::bytes::Bytes;
 use rustdds::mio1::{Events, Interest, Poll, Token};
 use rustdds::no_key::{DataReader, DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter};
@@ -21,6 +22,7 @@ use rustdds::{
 
 use super::link::{Transport, TransportCounts};
 use super::message::{COMMAND_LENGTH, STATE_LENGTH};
+use super::own_writes::OwnWrites;
 
 /// Time for which a writer may wait for a reader that does not acknowledge, ms. Below the time after which a command that has
 /// not been sent is a fault.
@@ -327,6 +329,7 @@ struct SharedCounts {
     send_errors: AtomicU64,
     foreign: AtomicU64,
     foreign_commands: AtomicU64,
+    own_writes: OwnWrites,
 }
 
 /// A console's transport: one thread takes states and watches the commands of other programs, one writes the newest command.
@@ -349,7 +352,7 @@ impl std::fmt::Debug for DdsTransport {
 
 impl DdsTransport {
     /// Opens the topics of states and commands, the latter as `commands` says, and starts the threads; the guard writes
-    /// `guards_command`, which is no command of another program.
+    /// `guards_command`, which after a silence of this program is no command of another one.
     ///
     /// # Errors
     /// A topic cannot be opened, or a thread not started.
@@ -400,7 +403,7 @@ impl Transport for DdsTransport {
     }
 
     fn counts(&self) -> TransportCounts {
-        let SharedCounts { sent, send_errors, foreign, foreign_commands } = &*self.counts;
+        let SharedCounts { sent, send_errors, foreign, foreign_commands, .. } = &*self.counts;
         let [sent, send_errors, foreign, foreign_commands] =
             [sent, send_errors, foreign, foreign_commands].map(|count| count.load(Ordering::Relaxed));
         TransportCounts { sent, send_errors, foreign, foreign_commands }
@@ -429,7 +432,10 @@ fn write_commands(
         let ends = ending.load(Ordering::Acquire);
         if newest.update() {
             let count = match writer.write(newest.output_buffer_mut()) {
-                Ok(()) => &counts.sent,
+                Ok(()) => {
+                    counts.own_writes.note(since_boot_ns());
+                    &counts.sent
+                }
                 Err(_) => &counts.send_errors,
             };
             count.fetch_add(1, Ordering::Relaxed);
@@ -441,10 +447,23 @@ fn write_commands(
     }
 }
 
+/// Time since boot, ns. It counts a suspension of the computer, in which this program is silent and after which the guard damps.
+fn since_boot_ns() -> u64 {
+    clock_gettime(ClockId::CLOCK_BOOTTIME).map_or(0, |time| Duration::from(time).as_nanos() as u64)
+}
+
 /// Identity of the commands of this program and its guard.
 struct Ours {
     participant: ParticipantIdentity,
     guards_command: [u8; COMMAND_LENGTH],
+}
+
+impl Ours {
+    /// Whether a command that is taken now is of another program.
+    fn is_foreign(&self, sample: &ReceivedSample, own_writes: &OwnWrites) -> bool {
+        let is_guards = || sample.payload[..] == self.guards_command && own_writes.guard_may_speak(since_boot_ns());
+        sample.participant != self.participant && !is_guards()
+    }
 }
 
 /// Passes states on, and counts the commands of other programs.
@@ -467,7 +486,7 @@ fn take_samples(
         }
         counts.foreign.store(states.foreign, Ordering::Relaxed);
         while let Some(sample) = commands.take() {
-            if sample.participant != ours.participant && sample.payload[..] != ours.guards_command {
+            if ours.is_foreign(&sample, &counts.own_writes) {
                 counts.foreign_commands.fetch_add(1, Ordering::Relaxed);
             }
         }

@@ -11,5 +11,6 @@ pub mod handover;
 pub mod link;
 pub mod message;
 pub mod network;
+pub mod own_writes;
 #[cfg(feature = "go2")]
 pub mod services;
