@@ -298,6 +298,20 @@ fn a_robot_whose_states_end_keeps_its_controller() {
     }
 }
 
+/// Regression: the name of a released controller was lost with every later failure, and the robot had none to be given back to.
+#[test]
+fn a_takeover_that_fails_after_the_release_was_sent_names_the_controller() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    let mut inject = |step: &str| {
+        if step.starts_with("releasing") {
+            emulated.handle.apply(EmulatorFault::Freeze);
+        }
+    };
+    let error = network(domain, 1).take_over(&lying().lying_position, &mut inject).unwrap_err();
+    assert_eq!(error.released_controller(), Some("normal"), "{error}");
+}
+
 /// Losses and damage of the network are counted as the Go1's; a robot that restarts is seen.
 #[test]
 fn losses_damage_and_a_restart_are_counted() {

@@ -7,9 +7,10 @@ use std::time::Duration;
 use super::folder::STUDY_FILE;
 use super::options::{EngineError, Options};
 use crate::optimize::ask::{Direction, SamplerConfig, SamplerKind};
-use crate::optimize::journal::Durability;
+use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space, SpaceError};
 use crate::optimize::study::{Storage, Study, StudyError, StudyOptions};
+use crate::optimize::trial::Trial;
 use crate::recording::record::SessionInfo;
 use crate::session::experiment::attributes::{self, Origin};
 use crate::session::experiment::study_attributes::{
@@ -77,11 +78,9 @@ pub(super) fn open_without_prior(
 /// When more trials count already than are asked for, or the study cannot be written.
 fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, EngineError> {
     let budget = options.budget();
-    if StudyAttributes::of(study.attributes()).budget != Some(budget) {
-        let counted = experiment::rows_of(study, &[]).iter().filter(|row| row.counts()).count() as u32;
-        if counted > budget {
-            return Err(EngineError::BudgetBelowCounted { budget, counted });
-        }
+    let kept = StudyAttributes::of(study.attributes()).budget;
+    require_budget(budget, kept, study.trials())?;
+    if kept != Some(budget) {
         study.annotate_study(&attributes::write(&BudgetAttribute { budget }))?;
     }
     let before = experiment::last_sampler(study);
@@ -152,6 +151,49 @@ fn made_on(attributes: &StudyAttributes) -> &str {
 /// # Errors
 /// When it is one, or the study cannot be read.
 pub fn check_backend(options: &Options) -> Result<(), EngineError> {
+    if options.accept_backend_change {
+        return Ok(());
+    }
+    check_stored(options, |study| {
+        let attributes = StudyAttributes::of(&study.user_attributes);
+        let (made, robot) = (made_on(&attributes), attributes.robot.as_deref().unwrap_or("unknown robot"));
+        let same_robot = options.backend == Backend::Simulator || robot == options.robot.name;
+        if made == options.backend.name() && same_robot {
+            return Ok(());
+        }
+        Err(EngineError::OtherBackend {
+            study: format!("{}, study {}", storage(options), study.name),
+            made: format!("{made} ({robot})"),
+            asked: format!("{} ({})", options.backend.name(), options.robot.name),
+        })
+    })
+}
+
+/// Refuses to continue a study in which more trials count already than are asked for; for a console, before it takes a robot over.
+///
+/// # Errors
+/// When it is one, or the study cannot be read.
+pub fn check_budget(options: &Options) -> Result<(), EngineError> {
+    check_stored(options, |study| {
+        require_budget(options.budget(), StudyAttributes::of(&study.user_attributes).budget, &study.trials)
+    })
+}
+
+/// Refuses a budget below the trials that count, unless it is the one that the study has `kept`.
+fn require_budget(budget: u32, kept: Option<u32>, trials: &[Trial]) -> Result<(), EngineError> {
+    let counts = |trial: &&Trial| attributes::row_of(trial, String::new(), &[]).counts();
+    let counted = trials.iter().filter(counts).count() as u32;
+    if counted > budget && kept != Some(budget) {
+        return Err(EngineError::BudgetBelowCounted { budget, counted });
+    }
+    Ok(())
+}
+
+/// Checks the study of `options` as it is stored; one that does not exist yet passes.
+fn check_stored(
+    options: &Options,
+    check: impl FnOnce(&StudyRecord) -> Result<(), EngineError>,
+) -> Result<(), EngineError> {
     let storage = storage(options);
     let exists = match &storage {
         Storage::Memory => false,
@@ -159,23 +201,12 @@ pub fn check_backend(options: &Options) -> Result<(), EngineError> {
         Storage::File(file) => file.is_file(),
         Storage::Redis(_) => true,
     };
-    if options.accept_backend_change || !exists {
+    if !exists {
         return Ok(());
     }
     let journal = storage.journal(Durability::Buffered).map_err(StudyError::from)?;
-    let name = study_name(options.task, options.seed);
-    let Some(study) = journal.state().find(&name) else { return Ok(()) };
-    let attributes = StudyAttributes::of(&journal.state().studies()[study].user_attributes);
-    let (made, robot) = (made_on(&attributes), attributes.robot.as_deref().unwrap_or("unknown robot"));
-    let same_robot = options.backend == Backend::Simulator || robot == options.robot.name;
-    if made == options.backend.name() && same_robot {
-        return Ok(());
-    }
-    Err(EngineError::OtherBackend {
-        study: format!("{storage}, study {name}"),
-        made: format!("{made} ({robot})"),
-        asked: format!("{} ({})", options.backend.name(), options.robot.name),
-    })
+    let found = journal.state().find(&study_name(options.task, options.seed));
+    found.map_or(Ok(()), |study| check(&journal.state().studies()[study]))
 }
 
 /// Queues the first point of the configuration.

@@ -34,7 +34,7 @@ pub enum HardwareError {
     Dds(#[from] go2::dds::DdsError),
     #[cfg(feature = "go2")]
     #[error("the robot was not taken over: {0}")]
-    Takeover(go2::services::TakeoverError),
+    Takeover(go2::services::TakeoverFailure),
     #[cfg(feature = "go2")]
     #[error("the robot's own controller was not started: {0}")]
     GiveBack(go2::services::TakeoverError),
@@ -42,6 +42,17 @@ pub enum HardwareError {
     WithoutGo2,
     #[error("a {robot} has no controller of its own to give it back to")]
     NoController { robot: &'static str },
+}
+
+impl HardwareError {
+    /// Returns the name of the robot's own controller if a takeover that failed may have released it.
+    pub fn released_controller(&self) -> Option<&str> {
+        match self {
+            #[cfg(feature = "go2")]
+            HardwareError::Takeover(failure) => failure.released.as_deref(),
+            _ => None,
+        }
+    }
 }
 
 /// Way by which a second process damps the robot when this one does not answer any more.
@@ -162,7 +173,8 @@ impl Network {
     /// receives each step. Returns the name of the released controller; none if none was active.
     ///
     /// # Errors
-    /// The robot does not answer, does not lie, or keeps its controller; nothing was sent to its motors.
+    /// The robot does not answer, does not lie, or keeps its controller; nothing was sent to its motors. The error holds the name of
+    /// a controller that may be released.
     pub fn take_over(&self, lying_rad: &Joints, report: &mut dyn FnMut(&str)) -> Result<Option<String>, HardwareError> {
         match self {
             Network::Go1(_) => Ok(None),

@@ -26,6 +26,8 @@ mod dialogs;
 mod evaluate;
 mod export;
 mod first_user;
+#[cfg(feature = "go2")]
+mod go2_takeover;
 mod graphics;
 mod guard;
 mod health_view;

@@ -83,6 +83,11 @@ impl Services {
 
 /// Steps of 10 ms until the handover ends, with responses after 20 ms; returns its end and the time, ms.
 fn run(services: &mut Services) -> (HandoverStatus, u64) {
+    let (handover, ms) = run_to_end(services);
+    (handover.status(), ms)
+}
+
+fn run_to_end(services: &mut Services) -> (Handover, u64) {
     let mut handover = Handover::begin(0, &LYING, 1000);
     let mut late: VecDeque<(u64, &str, ResponseMessage)> = VecDeque::new();
     let mut ids = Vec::new();
@@ -100,8 +105,8 @@ fn run(services: &mut Services) -> (HandoverStatus, u64) {
             ids.push(request.message.id);
             late.extend(services.serve(&request).map(|response| (now_ms + 20, request.service, response)));
         }
-        if let done @ (HandoverStatus::Done(_) | HandoverStatus::Failed(_)) = handover.status() {
-            return (done, now_ms);
+        if let HandoverStatus::Done(_) | HandoverStatus::Failed(_) = handover.status() {
+            return (handover, now_ms);
         }
     }
     panic!("no end in two minutes: {:?}", handover.status());
@@ -188,6 +193,24 @@ fn a_release_is_not_repeated_on_a_robot_that_was_raised_or_is_not_seen() {
     let HandoverStatus::Failed(error) = end else { panic!("{end:?}") };
     assert!(error.to_string().contains("no state of the robot for"), "{error}");
     assert!(!services.arrived.contains(&RELEASE), "{:?}", services.arrived);
+}
+
+/// Regression: the name was known only at a good end, so that a robot whose takeover failed later was not given back to it.
+#[test]
+fn the_name_of_the_controller_is_known_from_the_first_release_on() {
+    let new = || Services::new("mcf");
+    let sent = [
+        new(),
+        Services { release_code: 7008, ..new() },
+        Services { deaf_releases: 9, ..new() },
+        Services { raised_after_release: true, ..new() },
+    ];
+    let not_sent = [Services::new(""), Services { lies_down: false, ..new() }, Services { lost: u32::MAX, ..new() }];
+    let named = sent.map(|services| (services, Some("mcf"))).into_iter();
+    for (mut services, name) in named.chain(not_sent.map(|services| (services, None))) {
+        let (handover, _) = run_to_end(&mut services);
+        assert_eq!(handover.released_controller(), name, "{:?}", handover.status());
+    }
 }
 
 /// A program that was stopped finds the states of the time before: it does not know what happened since.

@@ -128,6 +128,7 @@ pub struct Handover {
     lying_rad: Joints,
     next_id: i64,
     releases: u32,
+    release_sent: bool,
     /// First controller that was found active.
     own_controller: Option<String>,
     /// Time of the last advance with a fresh state; at first the begin.
@@ -145,6 +146,7 @@ impl Handover {
             lying_rad: *lying_rad,
             next_id: first_id,
             releases: 0,
+            release_sent: false,
             own_controller: None,
             seen_ms: now_ms,
             lies_since_ms: None,
@@ -161,6 +163,11 @@ impl Handover {
             Step::Done => HandoverStatus::Done(self.own_controller.clone()),
             Step::Failed(error) => HandoverStatus::Failed(error.clone()),
         }
+    }
+
+    /// Returns the name of the controller to which a release was sent, answered or not; none before. The robot is given back to it.
+    pub fn released_controller(&self) -> Option<&str> {
+        self.own_controller.as_deref().filter(|_| self.release_sent)
     }
 
     /// Advances to `now_ms` with the joint positions of the newest state, none if it is older than [`FRESH_MS`]; returns the
@@ -281,6 +288,7 @@ impl Handover {
         if let Step::Request { sent_ms, .. } = &mut self.step {
             *sent_ms = Some(now_ms);
         }
+        self.release_sent |= function == Function::ReleaseMode;
         let id = self.next_id;
         self.next_id += 1;
         Some(function.request(id))

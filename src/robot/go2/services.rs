@@ -36,6 +36,16 @@ pub enum TakeoverError {
     Unanswered,
 }
 
+/// A takeover that failed.
+#[derive(Debug, thiserror::Error)]
+#[error("{error}")]
+pub struct TakeoverFailure {
+    /// Its cause.
+    pub error: TakeoverError,
+    /// Name of the controller to which a release was sent: it may be released. None if none was sent.
+    pub released: Option<String>,
+}
+
 /// Request and response topics of one service.
 struct Service {
     name: &'static str,
@@ -101,18 +111,32 @@ impl States {
 /// `reliable` whether commands will be sent reliably; `report` receives each new step, and once, after 2 s without states, what was found in the domain instead. Returns the name of the released controller; none if none was active.
 ///
 /// # Errors
-/// The handover failed; no command has been sent to a motor.
+/// The handover failed, or no reader of commands was found; no command has been sent to a motor.
 pub fn take_over(
     participant: &Participant,
     lying_rad: &Joints,
     reliable: bool,
     report: &mut dyn FnMut(&str),
-) -> Result<Option<String>, TakeoverError> {
+) -> Result<Option<String>, TakeoverFailure> {
+    let mut handover = Handover::begin(0, lying_rad, first_id());
+    let ended = hand_over(participant, &mut handover, report).and_then(|()| wait_for_reader(participant, reliable));
+    let released = handover.released_controller().map(str::to_owned);
+    match ended {
+        Ok(()) => Ok(released),
+        Err(error) => Err(TakeoverFailure { error, released }),
+    }
+}
+
+/// Advances `handover` to its end.
+fn hand_over(
+    participant: &Participant,
+    handover: &mut Handover,
+    report: &mut dyn FnMut(&str),
+) -> Result<(), TakeoverError> {
     let mut states = States::open(participant)?;
     let mut services =
         [Service::open(participant, motion_switcher::SERVICE)?, Service::open(participant, sport::SERVICE)?];
     let begun = Instant::now();
-    let mut handover = Handover::begin(0, lying_rad, first_id());
     let (mut reported, mut is_late) = (None, false);
     loop {
         states.receive();
@@ -134,10 +158,7 @@ pub fn take_over(
         }
         let status = handover.status();
         match &status {
-            HandoverStatus::Done(name) => {
-                wait_for_reader(participant, reliable)?;
-                return Ok(name.clone());
-            }
+            HandoverStatus::Done(_) => return Ok(()),
             HandoverStatus::Failed(error) => {
                 let found = match error {
                     HandoverError::NoState { .. } => {

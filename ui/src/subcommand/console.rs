@@ -181,7 +181,10 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         network,
         ..Options::new(config, robot, backend, selected.task)
     };
+    // All that needs no robot, before it is taken over from its own controller.
     engine::check_backend(&options)?;
+    engine::check_budget(&options)?;
+    options.config.settings(&options.robot, options.task, options.backend)?;
     terminal::check().map_err(Failure::input)?;
     options.provenance = arguments.study.provenance();
     options.live = arguments.live.as_deref().map(live::start).transpose()?;
@@ -190,17 +193,16 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let folder = selected.folder;
     options.folder = (!arguments.observe).then(|| folder.clone());
     let released = match &options.network {
-        Some(network) if !arguments.observe => take_over(network, &options.robot)?,
+        Some(network) if !arguments.observe => take_over(network, arguments, &options.robot)?,
         _ => None,
     };
-    let handle = engine::start(options)?;
-    if let Some(continued) = continued {
-        notice!("{continued}");
+    let ended = run_session(options, console, continued);
+    // A terminal that has hung up shows nothing.
+    let hung_up = matches!(ended, Ok((ConsoleExit::HungUp, _)));
+    if let Some(controller) = released.filter(|_| !hung_up) {
+        print_give_back(arguments, &controller, "is released, the legs are not supported");
     }
-    let recorder = handle.recorder_watch();
-    notice_waits(None);
-    let exit = app::run(Feed::live(handle), console)?;
-    let recorded = recorder.map(|recorder| recorder.get());
+    let (exit, recorded) = ended?;
     let recording = recorded.as_ref().map(|status| match status {
         // With the sessions before.
         RecorderStatus { finished: true, .. } | RecorderStatus { files: 2.., .. } => folder.clone(),
@@ -214,15 +216,6 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     if exit == ConsoleExit::HungUp || arguments.observe {
         return failure.map_or(Ok(()), Err);
     }
-    if let Some(controller) = released {
-        let DdsArguments { interface, domain } = &arguments.dds;
-        let interface = interface.as_ref().map_or_else(String::new, |name| format!(" --interface {name}"));
-        let domain = domain.map_or_else(String::new, |domain| format!(" --domain {domain}"));
-        put_line!(
-            "The robot's own controller {controller} is released, the legs are not supported. To start it again, lying:"
-        );
-        put_line!("  quadfrog give-back --controller {controller}{interface}{domain}");
-    }
     output::unbroken("The study and its recording are in", &folder.display().to_string());
     output::unbroken("  continue the study: ", &format!("quadfrog --resume {}", folder.display()));
     if let Some(recording) = recording {
@@ -234,6 +227,34 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         output::unbroken("  repair an incomplete recording: ", &format!("quadfrog recover {}", part.display()));
     }
     failure.map_or(Ok(()), Err)
+}
+
+/// Runs the engine with its console. Returns the way in which the console ended, and the last status of the recorder.
+fn run_session(
+    options: Options,
+    console: ConsoleOptions,
+    continued: Option<String>,
+) -> Result<(ConsoleExit, Option<RecorderStatus>), Failure> {
+    let handle = engine::start(options)?;
+    if let Some(continued) = continued {
+        notice!("{continued}");
+    }
+    let recorder = handle.recorder_watch();
+    notice_waits(None);
+    let exit = app::run(Feed::live(handle), console)?;
+    Ok((exit, recorder.map(|recorder| recorder.get())))
+}
+
+/// Prints the command that starts the robot's own controller again. `state` is what is known about it.
+fn print_give_back(arguments: &ConsoleArguments, controller: &str, state: &str) {
+    let DdsArguments { interface, domain } = &arguments.dds;
+    let option =
+        |name: &str, value: Option<String>| value.map_or_else(String::new, |value| format!(" --{name} {value}"));
+    let model = option("model", arguments.study.model.clone());
+    let interface = option("interface", interface.clone());
+    let domain = option("domain", domain.map(|domain| domain.to_string()));
+    put_line!("The robot's own controller {controller} {state}. To start it again, lying:");
+    put_line!("  quadfrog give-back --controller {controller}{model}{interface}{domain}");
 }
 
 /// Returns the settings of the network to the robot; none for the simulator, which takes no address.
@@ -263,7 +284,11 @@ fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Res
 }
 
 /// Takes the robot over from its own controller, once the operator has agreed. Returns the name of the released controller.
-fn take_over(network: &Network, robot: &RobotDescription) -> Result<Option<String>, Failure> {
+fn take_over(
+    network: &Network,
+    arguments: &ConsoleArguments,
+    robot: &RobotDescription,
+) -> Result<Option<String>, Failure> {
     if matches!(network, Network::Go1(_)) {
         return Ok(None);
     }
@@ -275,7 +300,12 @@ fn take_over(network: &Network, robot: &RobotDescription) -> Result<Option<Strin
         return Err(Failure::input("the robot was not taken over: the answer was not yes"));
     }
     let released = network.take_over(&robot.lying_position, &mut |step| put_line!("  {step}"));
-    released.map_err(Failure::input)
+    released.map_err(|error| {
+        if let Some(controller) = error.released_controller() {
+            print_give_back(arguments, controller, "may be released: the legs may not be supported");
+        }
+        Failure::input(error)
+    })
 }
 
 /// Returns the name of a recording while it is written.
