@@ -277,6 +277,21 @@ fn the_guards_commands_in_a_silence_are_not_counted() {
     assert_eq!(after, before);
 }
 
+/// Regression: the emulator kept its controller released over a restart, so that arming worked on; a robot starts its own again.
+#[test]
+fn a_robot_that_restarts_is_commanded_by_its_own_controller_again() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    network(domain, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    let (mut robot, _) = network(domain, 1).open(3.0).unwrap();
+    let damping = Some(JointCommand::damping(3.0));
+    tick_until(&mut *robot, damping, |link| link.received > 100 && link.sent > 1000);
+    assert_eq!(robot.link().unwrap().foreign_commands, 0);
+    emulated.handle.apply(EmulatorFault::Reboot);
+    let link = tick_until(&mut *robot, damping, |link| link.foreign_commands > 100);
+    assert_eq!(link.reboots, 1, "{link:?}");
+}
+
 /// Regression: the position of the first state was used without an end. If states alone fail, the services release a robot that a
 /// person may have raised.
 #[test]

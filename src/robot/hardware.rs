@@ -148,7 +148,9 @@ impl Network {
     pub const fn low_level(&self) -> &'static str {
         match self {
             Network::Go1(_) => "remote L2+A, L2+A, L2+B, L1+L2+START",
-            Network::Go2(_) => "its own controller released, as at the start",
+            Network::Go2(_) => {
+                "its own controller released by the start of this program (after a restart of the robot quit and start again)"
+            }
         }
     }
 

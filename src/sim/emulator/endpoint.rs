@@ -49,6 +49,9 @@ pub(super) trait Endpoint: Send + std::fmt::Debug {
 
     /// One millisecond of the robot's own services.
     fn advance(&mut self) {}
+
+    /// The robot boots again: its own controller starts as after the robot was switched on.
+    fn reboot(&mut self) {}
 }
 
 /// UDP endpoint of a Go1.

@@ -205,4 +205,8 @@ impl Endpoint for Go2Endpoint {
             let _ = self.own.write(&self.own_command);
         }
     }
+
+    fn reboot(&mut self) {
+        NORMAL.clone_into(&mut self.services.active);
+    }
 }

@@ -246,6 +246,7 @@ impl Emulator {
                 self.robot.time_ms = 0;
                 self.robot.motors = [None; JOINTS];
                 self.status.client = None;
+                self.endpoint.reboot();
             }
             EmulatorFault::Hot { joint, celsius } => defects.hot[joint] = Some(celsius),
             EmulatorFault::Battery(percent) => defects.charge_percent = Some(percent),
