@@ -1,7 +1,7 @@
 //! A second person on the same machine: `quadfrog sessions` lists what runs, `quadfrog attach` watches it and passes STOP on.
 
 use std::io::{BufRead, BufReader, Error, ErrorKind, Read, Write};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -305,11 +305,57 @@ fn a_folder_of_others_is_not_used_for_the_socket() {
     session.quit();
 }
 
+/// Regression: any user can make the folder in /tmp beforehand. A fake socket in it was listed as a session and confirmed a STOP that
+/// reached no robot; a folder that cannot be read ended the search.
+#[test]
+fn a_folder_of_others_is_named_and_not_searched() {
+    let lab = Lab::new();
+    let own = |name: &str| {
+        let folder = lab.folder.path().join(name);
+        std::fs::DirBuilder::new().mode(0o700).create(&folder).unwrap();
+        folder
+    };
+    let open = own("open");
+    let target = own("target");
+    let facts = r#"{"session":{"process":1,"folder":"/x","robot":"go1","backend":"hardware","task":"forward","operator":"Eve","since":""}}"#;
+    for folder in [&open, &target] {
+        let listener = UnixListener::bind(folder.join("1.sock")).unwrap();
+        std::thread::spawn(move || {
+            while let Ok((mut stream, _)) = listener.accept() {
+                let _ = stream.write_all(format!("{facts}\n").as_bytes());
+            }
+        });
+    }
+    std::fs::set_permissions(&open, PermissionsExt::from_mode(0o755)).unwrap();
+    let link = lab.folder.path().join("link");
+    std::os::unix::fs::symlink(&target, &link).unwrap();
+    let listed = |folder: &Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+        command.arg("sessions").env("QUADFROG_SESSIONS", folder).output().unwrap()
+    };
+    assert!(String::from_utf8(listed(&target).stdout).unwrap().contains("Eve"), "the socket answers as a session does");
+    for folder in [&open, &link] {
+        let output = listed(folder);
+        assert!(output.status.success() && output.stdout.is_empty(), "{output:?}");
+        let message = String::from_utf8(output.stderr).unwrap();
+        let skipped = format!("{}: not a folder of this user alone", folder.display());
+        assert!(message.contains(&skipped) && message.contains("no session runs"), "{message}");
+    }
+    // The folders after it are searched.
+    let runtime = own("runtime");
+    std::os::unix::fs::symlink(&target, runtime.join("quadfrog")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
+    command.args(["attach", "1"]).env_remove("QUADFROG_SESSIONS").env("XDG_RUNTIME_DIR", &runtime);
+    let message = refusal(&command.output().unwrap());
+    assert_eq!(message.matches("runtime/quadfrog: not a folder of this user alone").count(), 1, "{message}");
+    assert!(!message.contains("Eve"), "{message}");
+}
+
 #[test]
 fn a_socket_of_another_program_is_named_and_left_alone() {
     let lab = Lab::new();
     let folder = lab.sessions();
-    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::DirBuilder::new().mode(0o700).create(&folder).unwrap();
     let listener = UnixListener::bind(folder.join("1.sock")).unwrap();
     let answer = std::thread::spawn(move || listener.accept().unwrap().0.write_all(b"220 mail\n").unwrap());
     let output = lab.command(&["sessions"]);

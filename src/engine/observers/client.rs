@@ -2,12 +2,12 @@
 
 use std::io::{self, BufReader, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use super::{Answer, Demand, SessionFacts, line, read_message, socket_folders};
+use super::{Answer, Demand, SessionFacts, line, read_message, require_own, socket_folders};
 use crate::realtime::channel::StopLatch;
 
 /// Longest wait for the facts of a session.
@@ -32,22 +32,24 @@ pub struct FoundSessions {
     pub running: Vec<RunningSession>,
     /// The sockets that do not answer as a session does, with the reason.
     pub silent: Vec<(PathBuf, io::Error)>,
+    /// The folders that were not searched, with the reason.
+    pub skipped: Vec<(PathBuf, io::Error)>,
 }
 
 /// Finds the sessions that run on this machine under this user. The sockets of sessions that were killed are removed.
-///
-/// # Errors
-/// When a folder of sockets cannot be read.
-pub fn find_sessions() -> io::Result<FoundSessions> {
+/// A folder that another user made, or may enter, is not searched.
+pub fn find_sessions() -> FoundSessions {
     let mut found = FoundSessions::default();
     for folder in socket_folders() {
-        let entries = match std::fs::read_dir(&folder) {
+        let sockets = match sockets_in(&folder) {
             Err(error) if error.kind() == ErrorKind::NotFound => continue,
-            Err(error) => return Err(io::Error::new(error.kind(), format!("{}: {error}", folder.display()))),
-            Ok(entries) => entries,
+            Err(error) => {
+                found.skipped.push((folder, error));
+                continue;
+            }
+            Ok(sockets) => sockets,
         };
-        let sockets = entries.filter_map(|entry| Some(entry.ok()?.path()));
-        for socket in sockets.filter(|path| path.extension().is_some_and(|extension| extension == "sock")) {
+        for socket in sockets {
             match connect(&socket) {
                 Ok(session) => found.running.push(session),
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => drop(std::fs::remove_file(&socket)),
@@ -56,7 +58,13 @@ pub fn find_sessions() -> io::Result<FoundSessions> {
         }
     }
     found.running.sort_by_key(|session| session.facts.process);
-    Ok(found)
+    found
+}
+
+fn sockets_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    require_own(folder)?;
+    let paths = std::fs::read_dir(folder)?.filter_map(|entry| Some(entry.ok()?.path()));
+    Ok(paths.filter(|path| path.extension().is_some_and(|extension| extension == "sock")).collect())
 }
 
 fn connect(socket: &PathBuf) -> io::Result<RunningSession> {

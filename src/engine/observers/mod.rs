@@ -10,7 +10,7 @@ mod server;
 use std::fs::DirBuilder;
 use std::io::{self, BufRead, Read};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nix::unistd::geteuid;
 use serde::de::DeserializeOwned;
@@ -123,10 +123,20 @@ fn make_socket_folder() -> io::Result<PathBuf> {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(named(error)),
         _ => {}
     }
-    let found = folder.symlink_metadata().map_err(named)?;
+    require_own(&folder).map_err(named)?;
+    Ok(folder)
+}
+
+/// Refuses a folder of sockets that is another user's, open to others, or a link: any user can make one in `/tmp`, with sockets that
+/// answer as a session does.
+///
+/// # Errors
+/// When it is one, or cannot be examined.
+fn require_own(folder: &Path) -> io::Result<()> {
+    let found = folder.symlink_metadata()?;
     if found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & 0o077 == 0 {
-        return Ok(folder);
+        return Ok(());
     }
     let reason = "not a folder of this user alone; remove it, or give its permissions to its owner alone";
-    Err(named(io::Error::new(io::ErrorKind::PermissionDenied, reason)))
+    Err(io::Error::new(io::ErrorKind::PermissionDenied, reason))
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::app;
 use crate::feed::Feed;
 use crate::{notice, output, terminal};
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::engine::{FoundSessions, Observer, RunningSession, SessionFacts, find_sessions};
@@ -42,7 +42,7 @@ pub struct AttachArguments {
 pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
     let config = arguments::load_config(arguments.config.as_deref())?;
     let console = options(&arguments.screen, &config)?;
-    let session = choose(arguments.session.as_deref(), sessions()?)?;
+    let session = choose(arguments.session.as_deref(), sessions())?;
     let files = recordings_of(&session.facts.folder)?;
     let mut recording = Timeline::open(&files)?;
     terminal::check().map_err(Failure::input)?;
@@ -55,7 +55,7 @@ pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
 
 /// Lists the sessions that run.
 pub fn list() -> Result<(), Failure> {
-    let FoundSessions { running, silent } = sessions()?;
+    let FoundSessions { running, silent, .. } = sessions();
     if running.is_empty() {
         if !silent.iter().any(hangs) {
             notice!("{NONE_RUNS}");
@@ -74,9 +74,12 @@ pub fn list() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Finds the sessions and names those that do not answer.
-fn sessions() -> Result<FoundSessions, Failure> {
-    let found = find_sessions().map_err(|error| Failure::Other(anyhow!("sessions: {error}")))?;
+/// Finds the sessions, and names those that do not answer and the folders that were not searched.
+fn sessions() -> FoundSessions {
+    let found = find_sessions();
+    for (folder, error) in &found.skipped {
+        notice!("{}: {error}. Sessions in it are not listed", folder.display());
+    }
     for silent in &found.silent {
         let (socket, error) = silent;
         let name = socket.file_stem().unwrap_or_default().display();
@@ -87,7 +90,7 @@ fn sessions() -> Result<FoundSessions, Failure> {
             false => notice!("{}: {error}", socket.display()),
         }
     }
-    Ok(found)
+    found
 }
 
 /// Whether a session is there, named by its process as its socket is, that does not answer.
@@ -102,7 +105,7 @@ fn described(facts: &SessionFacts) -> String {
 
 /// Returns the session that is meant.
 fn choose(named: Option<&str>, sessions: FoundSessions) -> Result<RunningSession, Failure> {
-    let FoundSessions { running, silent } = sessions;
+    let FoundSessions { running, silent, .. } = sessions;
     let known: Vec<String> = running.iter().map(|session| described(&session.facts)).collect();
     let meant = |session: &RunningSession| {
         let Some(named) = named else { return true };

@@ -74,7 +74,7 @@ pub fn studies() -> Vec<CompletionCandidate> {
 
 /// Returns the sessions that run on this machine under this user.
 pub fn sessions() -> Vec<CompletionCandidate> {
-    let running = find_sessions().map(|found| found.running).unwrap_or_default();
+    let running = find_sessions().running;
     let candidate = |session: &RunningSession| {
         let facts = &session.facts;
         CompletionCandidate::new(facts.folder.as_os_str()).help(Some(format!("process {}", facts.process).into()))
