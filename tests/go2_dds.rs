@@ -163,7 +163,7 @@ fn a_robot_of_the_python_sdk_is_taken_over_commanded_and_given_back() {
     assert_eq!((link.corrupt, link.wrong_length, link.foreign, link.foreign_commands), (0, 0, 0, 0), "{link:?}");
     assert!(link.sent > 500, "{link:?}");
     drop(robot);
-    network.give_back("normal").unwrap();
+    network.give_back(&lying().lying_position, "normal").unwrap();
     let counts = peer.counts();
     let asked: Vec<(&str, i64)> = counts["asked"]
         .as_array()
@@ -325,6 +325,48 @@ fn a_takeover_that_fails_after_the_release_was_sent_names_the_controller() {
     };
     let error = network(domain, 1).take_over(&lying().lying_position, &mut inject).unwrap_err();
     assert_eq!(error.released_controller(), Some("normal"), "{error}");
+}
+
+/// Regression: the controller was started at once, while a console made the robot stand.
+#[test]
+fn a_robot_that_is_commanded_unseen_or_raised_is_not_given_back() {
+    let domain = domain();
+    let emulated = Emulated::start(domain);
+    let network = network(domain, 1);
+    network.take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    let (mut robot, _) = network.open(3.0).unwrap();
+    let damping = Some(JointCommand::damping(3.0));
+    tick_until(&mut *robot, damping, |link| link.received > 100);
+    let refusal = || network.give_back(&lying().lying_position, "normal").unwrap_err().to_string();
+    let ending = AtomicBool::new(false);
+    let commanded = std::thread::scope(|scope| {
+        let commanding = scope.spawn(|| {
+            while !ending.load(Ordering::Acquire) {
+                tick(&mut *robot, 5, damping);
+            }
+        });
+        let commanded = refusal();
+        ending.store(true, Ordering::Release);
+        commanding.join().unwrap();
+        commanded
+    });
+    assert!(commanded.contains("a program commands the robot"), "{commanded}");
+    drop(robot);
+    emulated.handle.apply(EmulatorFault::Angle { joint: 1, radians: 0.0 });
+    let raised = refusal();
+    assert!(raised.contains("FR_thigh is 1.36 rad from the lying pose"), "{raised}");
+    emulated.handle.apply(EmulatorFault::Clear);
+    emulated.handle.apply(EmulatorFault::Repeat);
+    let unseen = refusal();
+    assert!(unseen.contains("no state of the robot arrives"), "{unseen}");
+    emulated.handle.apply(EmulatorFault::Clear);
+    // Nothing was started by the refused requests: no commands arrive.
+    let commands = emulated.handle.status().commands;
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(emulated.handle.status().commands, commands);
+    network.give_back(&lying().lying_position, "ai").unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(emulated.handle.status().commands > commands + 50, "its own controller commands");
 }
 
 /// Losses and damage of the network are counted as the Go1's; a robot that restarts is seen.

@@ -37,7 +37,7 @@ pub enum HardwareError {
     Takeover(go2::services::TakeoverFailure),
     #[cfg(feature = "go2")]
     #[error("the robot's own controller was not started: {0}")]
-    GiveBack(go2::services::TakeoverError),
+    GiveBack(go2::give_back::GiveBackError),
     #[error("this program was built without the Go2: build it with `cargo build --release --features go2`")]
     WithoutGo2,
     #[error("a {robot} has no controller of its own to give it back to")]
@@ -184,14 +184,14 @@ impl Network {
         }
     }
 
-    /// Starts the robot's own controller `name` again.
+    /// Starts the robot's own controller `name` again. `lying_rad` is the lying pose.
     ///
     /// # Errors
-    /// The robot has none, does not answer, or refuses.
-    pub fn give_back(&self, name: &str) -> Result<(), HardwareError> {
+    /// The robot has none, is commanded by another program, does not lie, does not answer, or refuses.
+    pub fn give_back(&self, lying_rad: &Joints, name: &str) -> Result<(), HardwareError> {
         match self {
             Network::Go1(_) => Err(HardwareError::NoController { robot: "Go1" }),
-            Network::Go2(network) => give_back_go2(network, name),
+            Network::Go2(network) => give_back_go2(network, lying_rad, name),
         }
     }
 }
@@ -217,13 +217,13 @@ fn take_over_go2(
 }
 
 #[cfg(feature = "go2")]
-fn give_back_go2(network: &go2::network::Go2Network, name: &str) -> Result<(), HardwareError> {
+fn give_back_go2(network: &go2::network::Go2Network, lying_rad: &Joints, name: &str) -> Result<(), HardwareError> {
     let participant = go2::dds::Participant::join(network.domain, network.address()?)?;
-    go2::services::give_back(&participant, name).map_err(HardwareError::GiveBack)
+    go2::give_back::give_back(&participant, lying_rad, name).map_err(HardwareError::GiveBack)
 }
 
 #[cfg(not(feature = "go2"))]
-fn give_back_go2(_: &go2::network::Go2Network, _: &str) -> Result<(), HardwareError> {
+fn give_back_go2(_: &go2::network::Go2Network, _: &Joints, _: &str) -> Result<(), HardwareError> {
     Err(HardwareError::WithoutGo2)
 }
 

@@ -27,7 +27,7 @@ const SETTLE_MS: u64 = 2000;
 /// Releases after which a controller that is still active fails the handover.
 const RELEASES: u32 = 3;
 /// Largest distance of a joint from the lying pose, rad.
-const LYING_RAD: f64 = 0.5;
+pub const LYING_RAD: f64 = 0.5;
 
 /// Cause of a failed handover.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

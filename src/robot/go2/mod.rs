@@ -7,6 +7,8 @@
 pub mod convert;
 #[cfg(feature = "go2")]
 pub mod dds;
+#[cfg(feature = "go2")]
+pub mod give_back;
 pub mod handover;
 pub mod link;
 pub mod message;

@@ -1,4 +1,4 @@
-//! The robot's services over DDS: takes the robot over from its own controller, and gives it back.
+//! The robot's services over DDS: takes the robot over from its own controller.
 
 use std::time::{Duration, Instant};
 
@@ -8,15 +8,11 @@ use super::message::{ResponseMessage, StateMessage, motion_switcher, sport};
 use crate::robot::{JOINTS, Joints};
 
 /// Wait between two looks at the topics.
-const LOOK: Duration = Duration::from_millis(10);
+pub(super) const LOOK: Duration = Duration::from_millis(10);
 /// Time after which an endpoint that is not found is reported.
 const DISCOVERY: Duration = Duration::from_secs(2);
-/// Time without a response after which a request is repeated.
-const REPEAT: Duration = Duration::from_millis(500);
-/// Time without a response after which giving the robot back fails.
-const UNANSWERED: Duration = Duration::from_secs(5);
 
-/// Error of taking the robot over or giving it back.
+/// Error of taking the robot over.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message describes a variant and its fields")]
 pub enum TakeoverError {
@@ -28,12 +24,6 @@ pub enum TakeoverError {
     DemandsReliable,
     #[error("the robot does not read commands: {0}")]
     NoReader(String),
-    #[error("the service motion_switcher answered {name:?} with code {code}, data {data:?}")]
-    NotStarted { name: String, code: i32, data: String },
-    #[error(
-        "no response of the service motion_switcher within 5 s; check the interface, the domain and that the robot is switched on"
-    )]
-    Unanswered,
 }
 
 /// A takeover that failed.
@@ -47,31 +37,31 @@ pub struct TakeoverFailure {
 }
 
 /// Request and response topics of one service.
-struct Service {
+pub(super) struct Service {
     name: &'static str,
-    requests: TopicWriter,
-    responses: TopicReader,
+    pub requests: TopicWriter,
+    pub responses: TopicReader,
 }
 
 impl Service {
-    fn open(participant: &Participant, name: &'static str) -> Result<Service, DdsError> {
+    pub fn open(participant: &Participant, name: &'static str) -> Result<Service, DdsError> {
         let responses = participant.reader(&TopicType::response(name))?;
         Ok(Service { name, requests: participant.writer(&TopicType::request(name))?, responses })
     }
 
     /// Takes the oldest response that can be decoded.
-    fn response(&mut self) -> Option<ResponseMessage> {
+    pub fn response(&mut self) -> Option<ResponseMessage> {
         std::iter::from_fn(|| self.responses.take()).find_map(|sample| ResponseMessage::decode(&sample.payload).ok())
     }
 }
 
 /// Returns an identity for requests above those of earlier programs: the library of Unitree counts nanoseconds, too.
-fn first_id() -> i64 {
+pub(super) fn first_id() -> i64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(1, |time| time.as_nanos() as i64)
 }
 
 /// The robot's states, and the newest of them.
-struct States {
+pub(super) struct States {
     reader: TopicReader,
     newest: Option<NewestState>,
 }
@@ -84,12 +74,12 @@ struct NewestState {
 }
 
 impl States {
-    fn open(participant: &Participant) -> Result<States, DdsError> {
+    pub fn open(participant: &Participant) -> Result<States, DdsError> {
         Ok(States { reader: participant.reader(&TopicType::low_state())?, newest: None })
     }
 
     /// Waits for states, at most [`LOOK`], and takes all that came. One that repeats the robot's time is not a new one.
-    fn receive(&mut self) {
+    pub fn receive(&mut self) {
         self.reader.wait(LOOK);
         while let Some(sample) = self.reader.take() {
             let Ok(state) = StateMessage::decode(&sample.payload) else { continue };
@@ -101,7 +91,7 @@ impl States {
     }
 
     /// Joint positions of the newest state; none if it is not fresh.
-    fn position_rad(&self) -> Option<&Joints> {
+    pub fn position_rad(&self) -> Option<&Joints> {
         let fresh = Duration::from_millis(FRESH_MS);
         self.newest.as_ref().filter(|newest| newest.received.elapsed() <= fresh).map(|newest| &newest.position_rad)
     }
@@ -207,7 +197,7 @@ fn wait_for_reader(participant: &Participant, reliable: bool) -> Result<(), Take
 }
 
 /// Says which endpoints on a topic were found in place of the wanted one. `does` is what they do.
-fn found_for(wanted: &TopicType, found: &[FoundEndpoint], does: &str) -> String {
+pub(super) fn found_for(wanted: &TopicType, found: &[FoundEndpoint], does: &str) -> String {
     let types: Vec<_> =
         found.iter().filter(|found| found.topic == wanted.topic).map(|f| f.type_name.as_str()).collect();
     let TopicType { topic, type_name, .. } = wanted;
@@ -223,37 +213,5 @@ fn found_for(wanted: &TopicType, found: &[FoundEndpoint], does: &str) -> String 
         format!(
             "a program {does} {topic} with the right type, but nothing arrives; check the network and the quality of service"
         )
-    }
-}
-
-/// Starts the robot's own controller `name` again; the robot must lie, and no program command it.
-///
-/// # Errors
-/// The service does not answer within 5 s, or refuses.
-pub fn give_back(participant: &Participant, name: &str) -> Result<(), TakeoverError> {
-    let mut switcher = Service::open(participant, motion_switcher::SERVICE)?;
-    let (begun, first) = (Instant::now(), first_id());
-    let (mut next, mut sent) = (first, None::<Instant>);
-    loop {
-        if begun.elapsed() > UNANSWERED {
-            return Err(TakeoverError::Unanswered);
-        }
-        if sent.is_none_or(|sent| sent.elapsed() >= REPEAT) {
-            sent = Some(Instant::now());
-            // A lost request is repeated.
-            let _ = switcher.requests.write(&motion_switcher::select_mode(next, name).encode());
-            next += 1;
-        }
-        switcher.responses.wait(LOOK);
-        while let Some(response) = switcher.response() {
-            if !(first..next).contains(&response.id) || response.api != motion_switcher::SELECT_MODE {
-                continue;
-            }
-            if response.code == 0 {
-                return Ok(());
-            }
-            let ResponseMessage { code, data, .. } = response;
-            return Err(TakeoverError::NotStarted { name: name.to_owned(), code, data });
-        }
     }
 }

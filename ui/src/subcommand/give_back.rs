@@ -1,4 +1,5 @@
-//! `quadfrog give-back`: starts the robot's own controller again, which a session on hardware has released.
+//! `quadfrog give-back`: starts the robot's own controller again, which a session on hardware has released. Scripts use it: it asks
+//! nothing, and refuses a robot that does not lie or that another program commands.
 
 use crate::put_line;
 use clap::Args;
@@ -21,10 +22,10 @@ pub struct GiveBackArguments {
 }
 
 pub fn run(arguments: &GiveBackArguments) -> Result<(), Failure> {
-    let (files, _) = arguments::load_model(&arguments.model)?;
+    let (files, robot) = arguments::load_model(&arguments.model)?;
     let mut network = RealRobot::Go2.network(&files, &arguments.model)?;
     arguments.dds.apply(&mut network)?;
-    network.give_back(&arguments.controller).map_err(Failure::input)?;
+    network.give_back(&robot.lying_position, &arguments.controller).map_err(Failure::input)?;
     put_line!("The robot's own controller {} is active again.", arguments.controller);
     Ok(())
 }
