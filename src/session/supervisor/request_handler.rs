@@ -63,7 +63,7 @@ impl Supervisor {
                 Mode::Offline => {
                     self.command(Command::Contact)?;
                     self.control_wanted = true;
-                    Ok("braking commands are sent until the robot answers, then damping".to_owned())
+                    Ok("until states arrive a Go1 is sent braking commands, a Go2 nothing; then damping".to_owned())
                 }
                 Mode::Observe => {
                     self.control_wanted = true;

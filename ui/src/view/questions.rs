@@ -36,8 +36,8 @@ pub fn last_verdict_stays(model: &Model) -> Option<String> {
 pub fn take_control(model: &Model) -> Vec<Line<'static>> {
     let heard = match model.mode() {
         Mode::Offline => {
-            "The robot has sent nothing since the start: it answers only after a command. This console then sends braking \
-             commands without a target, and damping once the robot answers."
+            "The robot has sent nothing since the start. A Go1 answers only after a command: it is sent braking commands \
+             without a target. A Go2 is sent nothing. Damping is sent once states arrive."
         }
         _ => {
             "States arrive although this console has sent nothing: another program may command the robot. Damping is \
