@@ -3,8 +3,9 @@
 use crate::support::{Console, assert_shows, session};
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{LogLevel, Record, SessionInfo};
+use quadfrog::robot::LinkStatus;
 use quadfrog::session::operator_request::OperatorRequest;
-use quadfrog::telemetry::{Mode, Snapshot, Tick};
+use quadfrog::telemetry::{Counters, Mode, Snapshot, Tick};
 use quadfrog::trial::{Approval, Backend};
 use quadfrog_console::message::{Effect, Msg, ReplayStatus};
 
@@ -103,6 +104,28 @@ fn control_of_a_real_robot_is_taken_with_a_key_after_a_second_of_listening() {
     let mut console = Console::proposed();
     console.wait(2000);
     assert_eq!(console.press(&["L", "y"]), []);
+}
+
+/// Regression: commands of another program, which a Go2's console hears, were shown nowhere before the robot stood.
+#[test]
+fn commands_of_another_program_are_said_before_control_is_taken() {
+    let mut console = on_hardware(Console::new());
+    console.mode(Mode::Observe);
+    console.wait(1000);
+    let heard = |foreign_commands| {
+        let link = Some(LinkStatus { foreign_commands, ..LinkStatus::default() });
+        let tick = Tick { mode: Mode::Observe, ..Tick::default() };
+        let counters = Counters { link, ..Counters::default() };
+        Msg::Snapshot(Box::new(Snapshot { tick, counters, ..Snapshot::default() }))
+    };
+    console.press(&["5"]);
+    console.update(heard(0));
+    assert!(!console.screen(120, 40).contains("others sent"));
+    console.update(heard(41));
+    assert_shows(&console.screen(120, 40), &["others sent", "41 commands !"]);
+    console.press(&["L"]);
+    let screen = console.screen(80, 24);
+    assert!(screen.contains("Another program commands the robot: 41 commands"), "{screen}");
 }
 
 /// Regression: a second press approved however long ago the first one was.

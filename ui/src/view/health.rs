@@ -306,7 +306,7 @@ fn written(status: &RecorderStatus, time_ns: u64) -> String {
 fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
     let loss = 100.0 * link.loss_share();
     let states = format!("{} Hz, {} ms old", link.rate_hz, link.state_age_ms);
-    vec![
+    let mut rows = vec![
         row("states", states, link.state_age_ms > limits.state_age_ms),
         row("lost in 5 s", format!("{loss:.2} %, {} in all", link.lost), loss >= 100.0 * limits.loss_share),
         row("corrupt", format!("{} in 5 s, {} in all", link.recent_corrupt, link.corrupt), link.recent_corrupt > 0),
@@ -314,7 +314,12 @@ fn link_rows(link: &LinkStatus, limits: &HealthLimits) -> Vec<HealthRow> {
         detail("out of order", format!("{}, duplicate {}", link.out_of_order, link.duplicate), false),
         detail("other header", format!("{}, other length {}", link.foreign, link.wrong_length), false),
         detail("sent", format!("{}, failed {}", link.sent, link.send_errors), link.send_errors > 0),
-    ]
+    ];
+    // Only DDS shows them: on another link none is no sign.
+    if link.foreign_commands > 0 {
+        rows.push(row("others sent", counted(link.foreign_commands as usize, "command"), true));
+    }
+    rows
 }
 
 fn motor_rows(model: &Model) -> Vec<HealthRow> {

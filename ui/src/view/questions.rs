@@ -34,14 +34,22 @@ pub fn last_verdict_stays(model: &Model) -> Option<String> {
 }
 
 pub fn take_control(model: &Model) -> Vec<Line<'static>> {
+    let foreign_commands = model.snapshot.counters.link.map_or(0, |link| link.foreign_commands);
     let heard = match model.mode() {
         Mode::Offline => {
             "The robot has sent nothing since the start. A Go1 answers only after a command: it is sent braking commands \
              without a target. A Go2 is sent nothing. Damping is sent once states arrive."
+                .to_owned()
         }
+        _ if foreign_commands > 0 => format!(
+            "Another program commands the robot: {} of it until now. End it first: both would command the robot, and \
+             arming ends in a fault. Damping is sent from now on.",
+            counted(foreign_commands as usize, "command")
+        ),
         _ => {
             "States arrive although this console has sent nothing: another program may command the robot. Damping is \
              sent from now on."
+                .to_owned()
         }
     };
     vec![
