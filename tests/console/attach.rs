@@ -10,6 +10,7 @@ use std::time::Duration;
 use crate::pty::Session;
 use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
+use quadfrog::engine::{Observer, find_sessions};
 
 const SIZE: (u16, u16) = (120, 40);
 
@@ -113,7 +114,23 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     assert!(lab.sockets().is_empty() && lab.listed().is_empty());
 }
 
-/// Regression: the observer left before it had sent the STOP that came in one read with the key that quits.
+/// Regression: an observer that left within 10 ms of its STOP had not sent it.
+#[test]
+fn an_observer_that_leaves_at_once_has_sent_its_stop() {
+    let (_folder, mut session) = Session::opened(SIZE, &[]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    let process = session.pid();
+    let found = find_sessions().running;
+    let running = found.into_iter().find(|running| running.facts.process.to_string() == process.to_string());
+    let observer = Observer::join(running.expect("the session"), "Grace").unwrap();
+    observer.stop_latch().set();
+    drop(observer);
+    session.wait_for(&["DAMPED", "k acknowledges: STOP by Grace"]);
+    assert!(session.quit().success());
+}
+
+/// The STOP that comes in one read with the key that quits.
 #[test]
 fn a_stop_and_a_quit_at_once_stop_the_robot_of_a_watched_session() {
     let lab = Lab::new();
@@ -145,6 +162,7 @@ fn an_observer_of_a_hung_session_can_quit_after_its_stop() {
     session.signal(Signal::SIGSTOP);
     watcher.send("\x03\x03");
     assert!(watcher.wait().success());
+    watcher.wait_for(&["the session did not confirm STOP"]);
     session.signal(Signal::SIGCONT);
     session.quit();
 }

@@ -97,6 +97,16 @@ struct Connection {
     closing: AtomicBool,
 }
 
+impl Connection {
+    fn status(&self) -> ObserverStatus {
+        ObserverStatus {
+            ended: self.ended.load(Ordering::Acquire),
+            demanded: self.stop.count(),
+            stopped: self.stopped.load(Ordering::Acquire),
+        }
+    }
+}
+
 /// An observer of a session; it leaves when it is dropped, once its STOPs are confirmed or after 1 s.
 pub struct Observer(Arc<Connection>);
 
@@ -126,11 +136,13 @@ impl Observer {
 
     /// Returns the present state.
     pub fn status(&self) -> ObserverStatus {
-        ObserverStatus {
-            ended: self.0.ended.load(Ordering::Acquire),
-            demanded: self.0.stop.count(),
-            stopped: self.0.stopped.load(Ordering::Acquire),
-        }
+        self.0.status()
+    }
+
+    /// Returns a function that returns the present state, also after the observer has left.
+    pub fn watch(&self) -> impl Fn() -> ObserverStatus + use<> {
+        let connection = Arc::clone(&self.0);
+        move || connection.status()
     }
 }
 

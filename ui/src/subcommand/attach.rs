@@ -49,7 +49,11 @@ pub fn run(arguments: &AttachArguments) -> Result<(), Failure> {
     let console = console.with_robot(recorded_robot(&mut recording));
     let name = arguments::operator_or_user(arguments.operator.as_ref());
     let observer = Observer::join(session, &name).context("the session ended")?;
+    let status = observer.watch();
     app::run(Feed::attached(recording, observer), console)?;
+    if status().stopped < status().demanded {
+        notice!("the session did not confirm STOP: look at the robot; its remote and its power switch stop it");
+    }
     Ok(())
 }
 
