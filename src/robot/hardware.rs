@@ -47,11 +47,11 @@ pub enum HardwareError {
 impl HardwareError {
     /// Returns the name of the robot's own controller if a takeover that failed may have released it.
     pub fn released_controller(&self) -> Option<&str> {
-        match self {
-            #[cfg(feature = "go2")]
-            HardwareError::Takeover(failure) => failure.released.as_deref(),
-            _ => None,
+        #[cfg(feature = "go2")]
+        if let HardwareError::Takeover(failure) = self {
+            return failure.released.as_deref();
         }
+        None
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a console says about the own controller of a Go2, which it releases at the start; an emulated robot takes its place.
+//! Messages of a console about the own controller of a Go2, which it releases at the start; an emulated robot takes its place.
 
 use std::path::{Path, PathBuf};
 
