@@ -9,7 +9,7 @@ use mcap::McapError;
 use mcap::records::{Record, op};
 
 use super::chunk::{self, ChunkRecords, records_in};
-use super::error::RecordingError;
+use super::error::{ChunkError, RecordingError};
 use super::lengths::{length, texts_fit};
 use super::topic::Topic;
 
@@ -21,6 +21,10 @@ const FOOTER_BYTES: u64 = RECORD_HEAD + 8 + 8 + 4;
 const DATA_END_BYTES: u64 = RECORD_HEAD + 4;
 /// Largest accepted chunk, bytes: a larger length is damage, and must not decide how much memory is allocated.
 const LARGEST_CHUNK: usize = 32 * 1024 * 1024;
+/// Largest record of a chunk, bytes: with its head, and with the share that compression adds to random bytes.
+const LARGEST_PACKED_CHUNK: u64 = LARGEST_CHUNK as u64 + 1024 * 1024;
+/// Largest attachment, metadata record or index, bytes. The nominal size of a sparse file is no bound: it takes no room on the disk.
+const LARGEST_READ: u64 = 256 * 1024 * 1024;
 
 /// Position of a record in the file, bytes.
 #[derive(Debug, Clone, Copy)]
@@ -57,6 +61,8 @@ pub struct Container {
     pub scanned: bool,
     /// Offset of the record that ends the data; none of a file that was not finished.
     pub data_end: Option<u64>,
+    /// Schemas and channels of the index; none without an index: then those of the chunks count.
+    pub definitions: Vec<Record<'static>>,
     /// Offset of the first record that the scan has not passed.
     unscanned: u64,
     topics: Vec<Option<Topic>>,
@@ -65,21 +71,6 @@ pub struct Container {
 impl Container {
     /// Opens a file; finds the chunks in its index if there is one, else by scanning from record to record.
     pub fn open(path: &Path) -> Result<Container, RecordingError> {
-        Container::with(path, |container, bytes| match container.read_index(bytes) {
-            Ok(true) => Ok(()),
-            Ok(false) | Err(_) => container.scan(bytes),
-        })
-    }
-
-    /// Opens a file; finds the chunks by scanning from record to record, without the index.
-    pub fn open_by_scanning(path: &Path) -> Result<Container, RecordingError> {
-        Container::with(path, Container::scan)
-    }
-
-    fn with(
-        path: &Path,
-        find: impl FnOnce(&mut Container, u64) -> Result<(), McapError>,
-    ) -> Result<Container, RecordingError> {
         let io = |doing| move |source| RecordingError::Io { path: path.into(), doing, source };
         // Opening a pipe would wait for its writer.
         let kind = std::fs::metadata(path).map_err(io("open the file"))?.file_type();
@@ -98,10 +89,13 @@ impl Container {
             cut: None,
             scanned: false,
             data_end: None,
+            definitions: Vec::new(),
             unscanned: mcap::MAGIC.len() as u64,
             topics: Vec::new(),
         };
-        find(&mut container, bytes).map_err(|error| container.error(error))?;
+        if !container.read_index(bytes).unwrap_or(false) {
+            container.scan(bytes).map_err(|error| RecordingError::of_reading(path, error))?;
+        }
         // The channels of a recording are in its first chunk.
         if let Some(chunk) = container.chunks.first().cloned()
             && let Err(source) = container.read_chunk(&chunk)
@@ -138,9 +132,14 @@ impl Container {
             return Ok(false);
         }
         let (mut chunks, mut attachments, mut metadata) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut schemas, mut channels) = (Vec::new(), Vec::new());
         for (opcode, body) in records_in(&index) {
+            if !texts_fit(opcode, body) {
+                return Ok(false);
+            }
             match mcap::parse_record(opcode, body)? {
-                Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
+                schema @ Record::Schema { .. } => schemas.push(schema.into_owned()),
+                Record::Channel(channel) => channels.push(channel),
                 Record::ChunkIndex(index) => chunks.push(Chunk {
                     span: span(index.chunk_start_offset, index.chunk_length),
                     start: index.message_start_time,
@@ -152,7 +151,15 @@ impl Container {
                 _ => {}
             }
         }
+        // An index may leave out the chunks.
+        if chunks.is_empty() {
+            return Ok(false);
+        }
+        for channel in &channels {
+            self.add_channel(channel.id, &channel.topic);
+        }
         (self.chunks, self.attachments, self.metadata) = (chunks, attachments, metadata);
+        self.definitions = schemas.into_iter().chain(channels.into_iter().map(Record::Channel)).collect();
         self.data_end = Some(footer.summary_start.saturating_sub(DATA_END_BYTES));
         Ok(true)
     }
@@ -165,7 +172,7 @@ impl Container {
     /// Scans what was appended since the last scan; only of a file whose chunks were found by scanning.
     pub fn scan_appended(&mut self) -> Result<(), RecordingError> {
         let end = self.file.seek(SeekFrom::End(0)).map_err(McapError::Io);
-        end.and_then(|bytes| self.scan(bytes)).map_err(|error| self.error(error))
+        end.and_then(|bytes| self.scan(bytes)).map_err(|error| RecordingError::of_reading(&self.path, error))
     }
 
     /// Scans from record to record up to the first incomplete one, from where the last scan ended.
@@ -224,8 +231,11 @@ impl Container {
     /// Returns the records of a chunk after verifying its checksum, and knows its channels from then on.
     ///
     /// # Errors
-    /// When the checksum, the length of a record or a channel is wrong; nothing of such a chunk is used.
-    pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<ChunkRecords, McapError> {
+    /// When the checksum, a length, the number of messages or a channel is wrong; nothing of such a chunk is used.
+    pub fn read_chunk(&mut self, chunk: &Chunk) -> Result<ChunkRecords, ChunkError> {
+        if chunk.span.bytes > LARGEST_PACKED_CHUNK {
+            return Err(McapError::ChunkTooLarge(chunk.span.bytes).into());
+        }
         let body = self.read_record(chunk.span)?;
         let records = ChunkRecords::of(&body, LARGEST_CHUNK)?;
         for (opcode, body) in records.records().filter(|(opcode, _)| *opcode == op::CHANNEL) {
@@ -310,18 +320,15 @@ impl Container {
         if offset.checked_add(bytes).is_none_or(|last| last > end) {
             return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
         }
+        if bytes > LARGEST_READ {
+            let text =
+                format!("a record of {bytes} bytes is longer than {LARGEST_READ}: damaged, or not written by quadfrog");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, text).into());
+        }
         let mut buffer = vec![0; bytes as usize];
         self.file.seek(SeekFrom::Start(offset))?;
         self.file.read_exact(&mut buffer)?;
         Ok(buffer)
-    }
-
-    fn error(&self, error: McapError) -> RecordingError {
-        let path = self.path.clone();
-        match error {
-            McapError::Io(source) => RecordingError::Io { path, doing: "read", source },
-            source => RecordingError::Mcap { path, source },
-        }
     }
 }
 

@@ -1,7 +1,19 @@
 //! Errors of writing, reading and recovering a recording.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+
+/// A chunk could not be read.
+#[expect(missing_docs, reason = "the messages name variants and fields")]
+#[derive(Debug, thiserror::Error)]
+pub enum ChunkError {
+    #[error(transparent)]
+    Mcap(#[from] McapError),
+    #[error("it holds more than {most} messages: damaged, or not written by quadfrog")]
+    TooManyMessages { most: usize },
+}
 
 /// A recording could not be written, read or recovered.
 #[expect(missing_docs, reason = "the messages name variants and fields")]
@@ -37,9 +49,31 @@ pub enum RecordingError {
     )]
     NoSession { path: PathBuf },
     #[error("{}: damaged at its beginning ({source}); the rest cannot be decoded without its schemas and channels", path.display())]
-    Head { path: PathBuf, source: mcap::McapError },
+    Head { path: PathBuf, source: ChunkError },
     #[error("{}: cut off after {bytes} bytes, before the session's first message; nothing in it can be played", path.display())]
     TooShort { path: PathBuf, bytes: u64 },
     #[error("{}: could not write: {source}", path.display())]
-    Mcap { path: PathBuf, source: mcap::McapError },
+    Write { path: PathBuf, source: McapError },
+    #[error("{}: could not read: {source}", path.display())]
+    Read { path: PathBuf, source: McapError },
+}
+
+impl RecordingError {
+    /// Returns the error of reading the file `path`.
+    pub(super) fn of_reading(path: &Path, error: McapError) -> RecordingError {
+        let path = path.into();
+        match error {
+            McapError::Io(source) => RecordingError::Io { path, doing: "read", source },
+            source => RecordingError::Read { path, source },
+        }
+    }
+
+    /// Returns the error of writing the file `path`.
+    pub(super) fn of_writing(path: &Path, error: McapError) -> RecordingError {
+        let path = path.into();
+        match error {
+            McapError::Io(source) => RecordingError::Io { path, doing: "write", source },
+            source => RecordingError::Write { path, source },
+        }
+    }
 }

@@ -29,6 +29,11 @@ impl EventIndexBuilder {
         }
     }
 
+    /// Returns the channel and the log time of each event.
+    pub fn channels_and_times(&self) -> impl Iterator<Item = (u32, u64)> + '_ {
+        self.events.iter().map(|event| (event.channel, event.log_time))
+    }
+
     /// Returns the attachment that begins after `offset` bytes of the file, and forgets the events.
     pub fn attachment(&mut self, offset: u64) -> mcap::Attachment<'static> {
         let events = std::mem::take(&mut self.events);

@@ -30,6 +30,12 @@ pub fn texts_fit(opcode: u8, body: &[u8]) -> bool {
         // Number, number of the schema; topic, encoding, metadata.
         op::CHANNEL => after_map(after_text(after_text(4))),
         op::METADATA => after_map(after_text(0)),
+        // Two times, offset, length; offsets of the messages; their length; name of the compression; two lengths.
+        op::CHUNK_INDEX => after_text(after_text(8 + 8 + 8 + 8) + 8) + 8 + 8,
+        // Offset, length, two times, length of the data; name, media type.
+        op::ATTACHMENT_INDEX => after_text(after_text(8 + 8 + 8 + 8 + 8)),
+        // Offset, length; name.
+        op::METADATA_INDEX => after_text(8 + 8),
         _ => 0,
     };
     end <= body.len() as u64

@@ -32,7 +32,7 @@ mod trials;
 mod wire;
 pub mod writer;
 
-pub use error::RecordingError;
+pub use error::{ChunkError, RecordingError};
 
 /// The messages of `proto/frog.proto` as Rust types, made by `tests/recording/messages.rs`.
 #[allow(missing_docs, clippy::all, reason = "generated; proto/frog.proto documents the fields")]

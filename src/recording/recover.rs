@@ -1,16 +1,16 @@
 //! Recovery of a recording that was not finished or is damaged.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::records::{Metadata, Record};
+use mcap::records::{MessageHeader, Metadata, Record};
 
 use super::container::Container;
 use super::error::RecordingError;
-use super::event_index;
+use super::event_index::{self, IndexedEvent};
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
 use crate::trial::counted_are;
@@ -18,6 +18,9 @@ use crate::trial::counted_are;
 /// Name of the metadata record of a recovered file that lacks something, and its key for what that is.
 pub(super) const RECOVERED: &str = "recovered";
 pub(super) const LOST: &str = "lost";
+
+/// Events of damaged chunks that one new chunk holds, at most.
+const EVENTS_OF_A_CHUNK: u32 = 1_000;
 
 /// Result of a recovery.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +60,7 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
     if target.extension().is_none_or(|extension| extension != "mcap") {
         return Err(RecordingError::Name { path: target.into() });
     }
-    let mut container = Container::open_by_scanning(path)?;
+    let mut container = Container::open(path)?;
     let exists = || RecordingError::Exists { path: target.into() };
     if target.exists() {
         return Err(exists());
@@ -84,10 +87,7 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
     }
     file.set_len(0).map_err(io("create the file", &unfinished))?;
     let result = Output::new(Box::new(file)).and_then(|out| RecordCopier::new(out).all(&mut container));
-    let result = result.map_err(|error| match error {
-        McapError::Io(source) => RecordingError::Io { path: unfinished.clone(), doing: "write", source },
-        source => RecordingError::Mcap { path: path.into(), source },
-    });
+    let result = result.map_err(|error| RecordingError::of_writing(&unfinished, error));
     let named = result.and_then(|copied| {
         if target.exists() {
             return Err(exists());
@@ -112,6 +112,8 @@ struct CopyCounts {
     ticks: u64,
     messages: u64,
     damaged_chunks: usize,
+    /// Messages of channels that the file does not describe.
+    unknown_messages: usize,
     /// Attachments and metadata.
     damaged_extras: usize,
     /// Description of the lost parts.
@@ -126,10 +128,15 @@ impl RecordCopier {
 
     /// Copies everything, metadata and attachments first.
     fn all(mut self, container: &mut Container) -> Result<CopyCounts, McapError> {
+        // The first chunk has the schemas and channels, too; it may be damaged.
+        for definition in std::mem::take(&mut container.definitions) {
+            self.record(definition)?;
+        }
+        let copies = event_index::read(container).unwrap_or_default();
         for span in container.metadata.clone() {
-            match container.read_metadata(span)? {
-                Some(metadata) => self.out.mcap.write_metadata(&metadata)?,
-                None => self.done.damaged_extras += 1,
+            match container.read_metadata(span) {
+                Ok(Some(metadata)) => self.out.mcap.write_metadata(&metadata)?,
+                Ok(None) | Err(_) => self.done.damaged_extras += 1,
             }
         }
         for span in container.attachments.clone() {
@@ -155,6 +162,9 @@ impl RecordCopier {
                 Ok(Err(_)) | Err(_) => self.done.damaged_chunks += 1,
             }
         }
+        if self.done.damaged_chunks > 0 {
+            self.events_of_damaged_chunks(copies)?;
+        }
         self.done.lost = self.lost(container);
         if let Some(lost) = &self.done.lost {
             let metadata = BTreeMap::from([(LOST.into(), lost.clone())]);
@@ -164,13 +174,33 @@ impl RecordCopier {
         Ok(self.done)
     }
 
+    /// Writes the events that only the copies at the end of the old file still have, the session's own among them.
+    fn events_of_damaged_chunks(&mut self, copies: Vec<IndexedEvent>) -> Result<(), McapError> {
+        let written: BTreeSet<_> = self.out.events.channels_and_times().collect();
+        for (sequence, event) in (1..).zip(copies) {
+            let IndexedEvent { topic, log_time, data: Some(data) } = event else { continue };
+            let of_topic = self.channels.iter().find(|(_, (_, known))| *known == Some(topic));
+            let Some((&channel_id, &(new_id, _))) = of_topic else { continue };
+            if !written.contains(&(new_id.into(), log_time)) {
+                let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+                self.record(Record::Message { header, data: data.into() })?;
+            }
+            if sequence % EVENTS_OF_A_CHUNK == 0 {
+                self.out.mcap.flush()?;
+            }
+        }
+        self.out.mcap.flush()
+    }
+
     /// Describes what the new file lacks of the old one.
     fn lost(&self, container: &Container) -> Option<String> {
-        let CopyCounts { damaged_chunks, damaged_extras, .. } = self.done;
+        let CopyCounts { damaged_chunks, damaged_extras, unknown_messages, .. } = self.done;
         let damaged = [
             (damaged_chunks > 0)
                 .then(|| format!("{damaged_chunks} of {} damaged", counted_are(container.chunks.len(), "chunk"))),
             (damaged_extras > 0).then(|| format!("{} damaged", counted_are(damaged_extras, "attachment"))),
+            (unknown_messages > 0)
+                .then(|| format!("{} of unknown channels and left out", counted_are(unknown_messages, "message"))),
         ];
         let lost: Vec<_> = container.cut.clone().into_iter().chain(damaged.into_iter().flatten()).collect();
         (!lost.is_empty()).then(|| lost.join("; "))
@@ -197,6 +227,8 @@ impl RecordCopier {
                         self.out.events.add(topic, id, header.log_time, &data);
                     }
                     mcap.write_to_known_channel(&header, &data)?;
+                } else {
+                    self.done.unknown_messages += 1;
                 }
             }
             _ => {}

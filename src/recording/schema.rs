@@ -2,6 +2,7 @@
 
 use foxglove::messages::{Log, log};
 use prost::Message;
+use prost::encoding::{DecodeContext, WireType, decode_key, skip_field};
 
 use super::record::{
     ArmingCheckRecord, HealthLimits, LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Transition,
@@ -10,8 +11,15 @@ use super::topic::Topic;
 use super::wire::{DecodeError, Way, decoded, encoded, one_of};
 use super::{frog, tick, trials};
 use crate::robot::LinkStatus;
-use crate::telemetry::Counters;
+use crate::telemetry::{Counters, Tick};
 use crate::trial::ParameterInfo;
+
+/// Most ticks of a fault. The recorder writes `recorder::FAULT_TICKS`, 200.
+const MOST_FAULT_TICKS: usize = 1_000;
+
+/// Largest message that is decoded, bytes, but for the ticks of a fault, which are decoded one at a time. An empty element of a list
+/// takes 2 bytes in the message and up to 64 in memory. The longest own message lists every trial of a study, 22 bytes each.
+const LARGEST_RECORD: usize = 1024 * 1024;
 
 /// Encodes a record into `buffer` and returns its topic. `start_utc_ns` is the log time of engine time 0, ns.
 pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Vec<u8>) -> Topic {
@@ -67,6 +75,9 @@ pub fn encode(record: &Record, start_utc_ns: u64, log_time: u64, buffer: &mut Ve
 
 /// Decodes the record of a message; none on a topic that holds no records.
 pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> {
+    if topic != Topic::Fault && topic.is_event() && data.len() > LARGEST_RECORD {
+        return Err(DecodeError::TooLong(data.len(), LARGEST_RECORD));
+    }
     Ok(Some(match topic {
         Topic::Session => Record::Session(decoded(session, frog::Session::decode(data)?)?),
         Topic::Transition => {
@@ -88,10 +99,7 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             };
             Record::Log(LogRecord { level, source: message.name, message: message.message })
         }
-        Topic::Fault => {
-            let message = frog::FaultTicks::decode(data)?;
-            Record::FaultTicks(message.ticks.into_iter().map(tick::from_whole).collect::<Result<_, _>>()?)
-        }
+        Topic::Fault => Record::FaultTicks(fault_ticks(data)?),
         Topic::PreArm => {
             let item = |item: frog::pre_arm::Item| {
                 let (check, state) = (one_of("check", item.check)?, one_of("state of a check", item.state)?);
@@ -114,6 +122,27 @@ pub fn decode(topic: Topic, data: &[u8]) -> Result<Option<Record>, DecodeError> 
             return Ok(None);
         }
     }))
+}
+
+/// Decodes the ticks of a `frog.v1.FaultTicks` one at a time: a tick of 2 bytes in the message takes over a thousand in memory.
+///
+/// # Errors
+/// At the first tick that cannot be read, or that is one too many.
+fn fault_ticks(mut message: &[u8]) -> Result<Vec<Tick>, DecodeError> {
+    /// Number of the field `ticks` in `proto/frog.proto`.
+    const TICKS: u32 = 1;
+    let mut ticks = Vec::new();
+    while !message.is_empty() {
+        let (field, wire_type) = decode_key(&mut message)?;
+        if (field, wire_type) != (TICKS, WireType::LengthDelimited) {
+            skip_field(wire_type, field, &mut message, DecodeContext::default())?;
+        } else if ticks.len() == MOST_FAULT_TICKS {
+            return Err(DecodeError::TooMany("ticks of a fault", MOST_FAULT_TICKS));
+        } else {
+            ticks.push(tick::from_whole(frog::fault_ticks::Whole::decode_length_delimited(&mut message)?)?);
+        }
+    }
+    Ok(ticks)
 }
 
 fn stage(way: Way, ours: &mut StageRecord, m: &mut frog::StageInfo) -> Result<(), DecodeError> {

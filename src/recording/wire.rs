@@ -17,6 +17,10 @@ pub enum DecodeError {
     Unknown(&'static str, i32),
     #[error("{1} {0}: another number than this version expects")]
     Length(&'static str, usize),
+    #[error("more than {1} {0}")]
+    TooMany(&'static str, usize),
+    #[error("a message of {0} bytes, more than {1}")]
+    TooLong(usize, usize),
 }
 
 /// Direction in which a field is copied.

@@ -146,7 +146,7 @@ impl Writer {
         attachments: &[(&str, &str, &[u8])],
     ) -> Result<Writer, RecordingError> {
         let mut writer = Writer {
-            out: Output::new(sink).map_err(|error| error_at(&part, error))?,
+            out: Output::new(sink).map_err(|error| RecordingError::of_writing(&part, error))?,
             joints: tick::named_joints(None),
             robot: None,
             thinned: false,
@@ -165,7 +165,10 @@ impl Writer {
             path: path.into(),
             failed: None,
         };
-        writer.out.head(session, start_utc_ns, attachments).map_err(|error| error_at(&writer.part, error))?;
+        writer
+            .out
+            .head(session, start_utc_ns, attachments)
+            .map_err(|error| RecordingError::of_writing(&writer.part, error))?;
         writer.record(&Stamped { time_ns: begin_ns, record: Record::Session(session.clone()) })?;
         writer.sync()?;
         Ok(writer)
@@ -362,7 +365,7 @@ impl Writer {
             self.failed = self.failed.or(source.raw_os_error());
         }
         let first = self.failed.map(|number| McapError::Io(io::Error::from_raw_os_error(number)));
-        error_at(&self.part, first.unwrap_or(error))
+        RecordingError::of_writing(&self.part, first.unwrap_or(error))
     }
 
     /// Returns the ticks written so far.
@@ -378,13 +381,5 @@ impl Writer {
     /// Returns the final name.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-}
-
-fn error_at(path: &Path, error: McapError) -> RecordingError {
-    let path = path.to_path_buf();
-    match error {
-        McapError::Io(source) => RecordingError::Io { path, doing: "write", source },
-        source => RecordingError::Mcap { path, source },
     }
 }

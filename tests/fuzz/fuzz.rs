@@ -11,6 +11,7 @@
 mod corpus;
 #[path = "../support/count_alloc.rs"]
 mod count_alloc;
+mod hostile;
 mod mutate;
 mod targets;
 

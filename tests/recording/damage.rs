@@ -11,7 +11,7 @@ use mcap::records::Record as McapRecord;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use proptest::prelude::*;
 use quadfrog::recording::RecordingError;
-use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::player::{Played, Player, is_recoverable};
 use quadfrog::recording::record::{Record, Stamped, Transition};
 use quadfrog::recording::recover::recover;
 use quadfrog::recording::writer::Writer;
@@ -160,15 +160,20 @@ proptest! {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = file(folder.path(), "session.mcap", &bytes);
+        let recovered = recover(&path);
         if let Ok(player) = Player::open(&path) {
             prop_assert_eq!(player.session(), &session());
             // In the order of time, as everything is, with holes. Of the session's own message the event index has a copy.
-            let mut everything = whole().everything.iter();
+            let (mut everything, mut count) = (whole().everything.iter(), 0);
             for played in player.filter(|played| !is_session(played)) {
                 prop_assert!(everything.any(|recorded| *recorded == played), "{played:?} was never recorded");
+                count += 1;
             }
+            // Regression: less was recovered than is played.
+            let recovered = recovered.unwrap();
+            prop_assert!(recovered.messages > count, "{count} played, {recovered:?}");
+            prop_assert!(Player::open(&recovered.path).unwrap().count() as u64 > count);
         }
-        let _ = recover(&path); // must not panic
     }
 }
 
@@ -187,6 +192,104 @@ fn a_session_whose_own_chunk_is_damaged_opens_from_the_event_index() {
     assert_equal(&played[played.len() - 500..], &everything[everything.len() - 500..]);
     let damage = player.damage().unwrap();
     assert!(damage.contains("1 of ") && damage.contains("chunks are damaged and left out"), "{damage}");
+}
+
+/// Regression: a bit in the length of a chunk, which the player takes from the index, lost everything after it.
+#[test]
+fn a_finished_file_with_a_wrong_length_in_the_head_of_a_chunk_is_recovered_whole() {
+    let Whole { finished, everything, .. } = whole();
+    let mut bytes = finished.clone();
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    bytes[summary.chunk_indexes[3].chunk_start_offset as usize + 2] ^= 0x10;
+    let folder = tempfile::tempdir().unwrap();
+    let path = file(folder.path(), "session.mcap", &bytes);
+    assert_equal(&play_damaged(&path).unwrap().0, everything);
+    let recovered = recover(&path).unwrap();
+    assert_eq!(recovered.lost, None);
+    let (again, damage) = play_damaged(&recovered.path).unwrap();
+    assert_eq!(damage, None);
+    assert_equal(&again, everything);
+}
+
+/// Regression: a file whose first chunk is damaged was refused, although its index has the channels and its end the session.
+#[test]
+fn a_finished_file_with_a_damaged_first_chunk_is_recovered() {
+    let Whole { finished, .. } = whole();
+    let mut bytes = finished.clone();
+    let summary = mcap::Summary::read(finished).unwrap().unwrap();
+    let first = summary.chunk_indexes.iter().min_by_key(|chunk| chunk.chunk_start_offset).unwrap();
+    bytes[(first.chunk_start_offset + first.chunk_length - 8) as usize] ^= 0x55;
+    let folder = tempfile::tempdir().unwrap();
+    let path = file(folder.path(), "session.mcap", &bytes);
+    let mut player = Player::open(&path).unwrap();
+    let played: Vec<_> = player.by_ref().collect();
+    let recovered = recover(&path).unwrap();
+    assert!(recovered.lost.unwrap().starts_with("1 of "));
+    let mut again = Player::open(&recovered.path).unwrap();
+    assert_eq!((again.session(), again.events()), (player.session(), player.events()));
+    let others: Vec<_> = again.by_ref().filter(|played| !is_session(played)).collect();
+    assert_equal(&others, &played);
+    assert_eq!(again.damage(), None);
+}
+
+/// Regression: messages of a channel that the file does not describe were left out without a word.
+#[test]
+fn messages_of_unknown_channels_are_counted_as_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = mcap::records::MessageHeader { channel_id: 77, sequence: 0, log_time: 1, publish_time: 1 };
+    let record = |opcode: u8, body: &[u8]| [&[opcode], &(body.len() as u64).to_le_bytes()[..], body].concat();
+    let message = [&head.channel_id.to_le_bytes()[..], &[0; 4 + 8 + 8], b"{}"].concat();
+    let records = record(mcap::records::op::MESSAGE, &message);
+    let chunk = [
+        &[0; 16][..],
+        &(records.len() as u64).to_le_bytes(),
+        &crc32fast::hash(&records).to_le_bytes(),
+        &[0; 4],
+        &(records.len() as u64).to_le_bytes(),
+        &records,
+    ];
+    let bytes = [mcap::MAGIC, &record(mcap::records::op::CHUNK, &chunk.concat())].concat();
+    let recovered = recover(file(folder.path(), "session.mcap.part", &bytes)).unwrap();
+    assert_eq!(recovered.messages, 0);
+    let lost = recovered.lost.unwrap();
+    assert!(lost.ends_with("1 message is of unknown channels and left out"), "{lost}");
+}
+
+/// Regression: 1,000 messages were "a message", of no time, and not named beside a damaged chunk; `recover` was advised, which copies
+/// them as they are.
+#[test]
+fn messages_that_cannot_be_read_are_counted_with_the_first_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = mcap::Writer::new(std::io::Cursor::new(Vec::new())).unwrap();
+    let [session, stage] =
+        ["/session", "/opt/stage"].map(|topic| writer.add_channel(0, topic, "protobuf", &Default::default()).unwrap());
+    let mut write = |channel_id, time_ns, data: &[u8]| {
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: time_ns, publish_time: time_ns };
+        writer.write_to_known_channel(&header, data).unwrap();
+    };
+    write(session, 0, &[]);
+    (0..1_000).for_each(|number| write(stage, (number + 5) * MS, &[0xff]));
+    writer.flush().unwrap();
+    let header = mcap::records::MessageHeader { channel_id: stage, sequence: 0, log_time: 2_000 * MS, publish_time: 0 };
+    writer.write_to_known_channel(&header, &[]).unwrap();
+    writer.finish().unwrap();
+    let mut bytes = writer.into_inner().into_inner();
+    let damage = |bytes: &[u8]| {
+        let mut player = Player::open(file(folder.path(), "session.mcap", bytes)).unwrap();
+        player.by_ref().for_each(drop);
+        player.seek(0);
+        player.by_ref().for_each(drop);
+        player.damage().unwrap()
+    };
+    let messages = damage(&bytes);
+    let expected = "session.mcap: 1000 messages cannot be read, the first at 0.005 s: not a message of its schema";
+    assert!(messages.contains(expected) && messages.ends_with("; perhaps of a newer version"), "{messages}");
+    assert!(!is_recoverable(&messages));
+    let last = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes[1].clone();
+    bytes[(last.chunk_start_offset + last.chunk_length - 8) as usize] ^= 0x55;
+    let both = damage(&bytes);
+    assert!(both.contains("1000 messages cannot be read") && both.contains("1 of 2 chunks are damaged"), "{both}");
+    assert!(is_recoverable(&both));
 }
 
 #[test]

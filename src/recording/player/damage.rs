@@ -4,6 +4,7 @@ use foxglove::messages::JointStates;
 use prost::Message;
 
 use super::Player;
+use super::events::MOST_EVENTS;
 use super::lost::{DamagedChunk, LostPart};
 use crate::recording::chunk::ChunkRecords;
 use crate::recording::container::Chunk;
@@ -20,26 +21,47 @@ const TICK_NS: u64 = 1_000_000;
 /// Longest time between the messages of a chunk, and between chunks, that needs no proof, ns: a session flushes every second.
 const USUAL_SPAN_NS: u64 = 60_000_000_000;
 
+/// Ends of the descriptions of messages that cannot be read and of events that are left out.
+const NEWER_VERSION: &str = "perhaps of a newer version";
+const NOT_OURS: &str = "damaged, or not written by quadfrog";
+
+/// Returns whether `quadfrog recover` helps against a damage as [`Player::damage`] describes it: against damaged chunks and a missing
+/// end. It copies messages as they are.
+pub fn is_recoverable(damage: &str) -> bool {
+    !damage.ends_with(NEWER_VERSION) && !damage.ends_with(NOT_OURS)
+}
+
 impl Player {
     /// Returns a description of the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
     /// checksum when it is played. None for an intact file.
     pub fn damage(&self) -> Option<String> {
-        let chunks = match (self.damaged.first(), &self.first_trouble) {
-            (None, None) => None,
-            (None, Some(trouble)) => Some(format!("a message cannot be read: {trouble}")),
-            (Some(first), _) => Some(format!(
+        let seconds = |log_time: u64| log_time.saturating_sub(self.start_utc_ns) as f64 / 1e9;
+        let unreadable = self.unreadable.first.as_ref().map(|(log_time, error)| {
+            let count = self.unreadable.count();
+            let first = if count > 1 { "the first " } else { "" };
+            let messages = counted(count, "message");
+            format!("{messages} cannot be read, {first}at {:.3} s: {error}; {NEWER_VERSION}", seconds(*log_time))
+        });
+        let left_out = self.left_out_from.map(|log_time| {
+            let from_s = seconds(log_time);
+            format!("holds more than {MOST_EVENTS} events; those after {from_s:.3} s are left out: {NOT_OURS}")
+        });
+        let chunks = self.damaged.first().map(|first| {
+            format!(
                 "{} of {} damaged and left out, {:.3} s ({})",
                 self.damaged.len(),
                 counted_are(self.chunks.len(), "chunk"),
                 self.lost_ns() as f64 / 1e9,
                 first.reason
-            )),
-        };
+            )
+        });
         let unguarded = (!self.unguarded.is_empty()).then(|| {
             let count = counted(self.unguarded.len(), "chunk");
             format!("{count} without a checksum played as decoded; a wrong number there is not seen")
         });
-        let parts: Vec<_> = self.container.cut.iter().chain(&chunks).chain(&unguarded).map(String::as_str).collect();
+        // What can be recovered comes last: see `is_recoverable`.
+        let parts = [&unreadable, &left_out, &self.container.cut, &chunks, &unguarded];
+        let parts: Vec<&str> = parts.into_iter().flatten().map(String::as_str).collect();
         (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
     }
 
@@ -62,8 +84,7 @@ impl Player {
         if self.container.scanned && self.is_complete() {
             found.push("its index is damaged; its chunks were found one by one".into());
         }
-        let path = self.path.clone();
-        let whole = self.container.verify_data().map_err(|source| RecordingError::Mcap { path, source })?;
+        let whole = self.container.verify_data().map_err(|error| RecordingError::of_reading(&self.path, error))?;
         if whole == Some(false) && found.is_empty() && self.damaged.is_empty() && self.unguarded.is_empty() {
             found.push("bytes between its chunks are damaged; every message is there".into());
         }

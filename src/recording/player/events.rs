@@ -1,73 +1,102 @@
 //! The events of a recording, and its markers: from the copies at its end, or from the chunks that hold any.
 
+use std::collections::BTreeSet;
+
 use prost::Message;
 
 use super::{Marker, MarkerKind, Player};
 use crate::recording::container::Chunk;
 use crate::recording::error::RecordingError;
 use crate::recording::event_index::IndexedEvent;
-use crate::recording::record::Stamped;
+use crate::recording::record::{Record, Stamped};
 use crate::recording::topic::Topic;
 use crate::recording::wire::DecodeError;
 use crate::recording::{frog, schema};
+
+/// Most events and markers of a file, and most messages that are read ahead; each tick of a fault counts. A session writes some 20
+/// events a trial.
+pub(super) const MOST_EVENTS: usize = 262_144;
 
 impl Player {
     /// Reads the events of chunks, and of the copies at the end of the file. Appends them and the markers with their log times;
     /// returns that of engine time 0, from the session's first record.
     pub(super) fn read_events(&mut self, chunks: &[Chunk], copies: Option<Vec<IndexedEvent>>) -> Option<u64> {
         let mut session = None;
-        let mut large: Option<Vec<(Topic, u64)>> = None;
+        // Those without a copy, in the order of time.
+        let mut large: Option<BTreeSet<(u64, Topic)>> = None;
+        let mut errors = Vec::new();
         for IndexedEvent { topic, log_time, data } in copies.into_iter().flatten() {
             let large = large.get_or_insert_default();
             match data {
-                Some(data) => self.add_event(topic, log_time, &data, &mut session),
-                None => large.push((topic, log_time)),
+                Some(data) => {
+                    let added = self.add_event(topic, log_time, &data, &mut session);
+                    errors.extend(added.err().map(|error| (log_time, error)));
+                }
+                None => drop(large.insert((log_time, topic))),
             }
         }
+        self.unreadable.add(0, errors);
         for chunk in chunks {
             let channels = chunk.channels.as_ref();
             let holds = |wanted: &dyn Fn(Topic) -> bool| {
                 let known = |channel: &u16| self.container.topic(*channel);
                 channels.is_none_or(|channels| channels.iter().filter_map(known).any(wanted))
             };
-            let in_chunk = |(topic, time): &(Topic, u64)| {
-                (chunk.start..=chunk.end).contains(time) && holds(&|held: Topic| held == *topic)
-            };
             let read = match &large {
-                Some(large) => large.iter().any(in_chunk),
+                Some(large) => {
+                    let from_start = large.range((chunk.start, Topic::ALL[0])..);
+                    let mut in_chunk = from_start.take_while(|(time, _)| *time <= chunk.end);
+                    in_chunk.any(|(_, topic)| holds(&|held: Topic| held == *topic))
+                }
                 None => holds(&Topic::is_event),
             };
             if !read {
                 continue;
             }
             let Some(records) = self.records_of(chunk) else { continue };
+            let mut errors = Vec::new();
             for (header, data) in records.messages().flatten() {
                 let Some(topic) = self.container.topic(header.channel_id).filter(|topic| topic.is_event()) else {
                     continue;
                 };
-                if large.as_ref().is_none_or(|large| large.contains(&(topic, header.log_time))) {
-                    self.add_event(topic, header.log_time, data, &mut session);
+                if large.as_ref().is_none_or(|large| large.contains(&(header.log_time, topic))) {
+                    let added = self.add_event(topic, header.log_time, data, &mut session);
+                    errors.extend(added.err().map(|error| (header.log_time, error)));
                 }
             }
+            self.unreadable.add(chunk.span.offset, errors);
         }
         session
     }
 
-    fn add_event(&mut self, topic: Topic, log_time: u64, data: &[u8], session: &mut Option<u64>) {
+    /// Adds an event or a marker; leaves it out beyond [`MOST_EVENTS`].
+    ///
+    /// # Errors
+    /// When it cannot be decoded.
+    fn add_event(
+        &mut self,
+        topic: Topic,
+        log_time: u64,
+        data: &[u8],
+        session: &mut Option<u64>,
+    ) -> Result<(), DecodeError> {
+        if self.counted_events >= MOST_EVENTS {
+            let from = self.left_out_from.unwrap_or(log_time);
+            self.left_out_from = Some(from.min(log_time));
+            return Ok(());
+        }
         if topic == Topic::Session && session.is_none() {
             *session = frog::Session::decode(data).ok().map(|message| message.start_utc_ns);
         }
         if topic == Topic::Marker {
-            match marker(data) {
-                Ok(kind) => self.markers.push(Marker { time_ns: log_time, kind }),
-                Err(error) => self.note(&error),
-            }
-        } else {
-            match schema::decode(topic, data) {
-                Ok(record) => self.events.extend(record.map(|record| Stamped { time_ns: log_time, record })),
-                Err(error) => self.note(&error),
-            }
+            self.markers.push(Marker { time_ns: log_time, kind: marker(data)? });
+            self.counted_events += 1;
+        } else if let Some(record) = schema::decode(topic, data)? {
+            let event = Stamped { time_ns: log_time, record };
+            self.counted_events += weight(&event.record);
+            self.events.push(event);
         }
+        Ok(())
     }
 
     /// Turns the log times of the events and markers from these on into times since the engine started, and sorts.
@@ -91,6 +120,14 @@ impl Player {
         } else {
             RecordingError::NoSession { path }
         }
+    }
+}
+
+/// Returns the number of events as which a record counts: a tick of a fault takes as much memory as a record.
+pub(super) fn weight(record: &Record) -> usize {
+    match record {
+        Record::FaultTicks(ticks) => ticks.len().max(1),
+        _ => 1,
     }
 }
 

@@ -1,5 +1,9 @@
 //! Parts of a recording that cannot be read.
 
+use std::collections::BTreeMap;
+
+use crate::recording::wire::DecodeError;
+
 /// A part of a recording that cannot be read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LostPart {
@@ -17,4 +21,36 @@ pub struct DamagedChunk {
     pub start: u64,
     pub end: u64,
     pub reason: String,
+}
+
+/// Messages that cannot be read. Those of a chunk that is read twice count once.
+#[derive(Default)]
+pub struct UnreadableMessages {
+    /// Number of them in each chunk, by the chunk's offset; at offset 0 those among the copies of the events.
+    counts: BTreeMap<u64, usize>,
+    /// Log time and error of the earliest one.
+    pub first: Option<(u64, String)>,
+}
+
+impl UnreadableMessages {
+    /// Takes over those of one reading of a chunk.
+    pub fn add(&mut self, offset: u64, errors: impl IntoIterator<Item = (u64, DecodeError)>) {
+        let mut count = 0;
+        for (log_time, error) in errors {
+            count += 1;
+            if self.first.as_ref().is_none_or(|(earliest, _)| log_time < *earliest) {
+                self.first = Some((log_time, error.to_string()));
+            }
+        }
+        if count > 0 {
+            let known = self.counts.entry(offset).or_default();
+            *known = count.max(*known);
+        }
+    }
+
+    /// Returns their number. A copy is of a message in a chunk.
+    pub fn count(&self) -> usize {
+        let copies = self.counts.get(&0).copied().unwrap_or(0);
+        (self.counts.values().sum::<usize>() - copies).max(copies)
+    }
 }

@@ -17,10 +17,13 @@ use super::event_index;
 use super::record::{Record, SessionInfo, Stamped};
 use super::schema;
 use super::topic::Topic;
+use super::wire::DecodeError;
 use crate::telemetry::Tick;
 
-use lost::DamagedChunk;
+pub use damage::is_recoverable;
+use events::{MOST_EVENTS, weight};
 pub use lost::LostPart;
+use lost::{DamagedChunk, UnreadableMessages};
 use tick_joiner::TickJoiner;
 
 /// A played tick or record.
@@ -39,6 +42,14 @@ impl Played {
         match self {
             Played::Tick(tick) => tick.time_ns,
             Played::Record(stamped) => stamped.time_ns,
+        }
+    }
+
+    /// Returns the number of messages as which it counts in the queue.
+    fn weight(&self) -> usize {
+        match self {
+            Played::Tick(_) => 1,
+            Played::Record(stamped) => weight(&stamped.record),
         }
     }
 }
@@ -82,7 +93,15 @@ pub struct Player {
     damaged: Vec<DamagedChunk>,
     /// Offsets of the chunks that were played without a checksum.
     unguarded: BTreeSet<u64>,
-    first_trouble: Option<String>,
+    unreadable: UnreadableMessages,
+    /// Events and markers, with each tick of a fault.
+    counted_events: usize,
+    /// Log time of the first event that was left out: there are too many.
+    left_out_from: Option<u64>,
+    /// Messages in the queue, with each tick of a fault.
+    queued: usize,
+    /// Time up to which everything was played when the queue was full; 0 before.
+    played_until_ns: u64,
 }
 
 impl Player {
@@ -108,7 +127,11 @@ impl Player {
             sparse_until: None,
             damaged: Vec::new(),
             unguarded: BTreeSet::new(),
-            first_trouble: None,
+            unreadable: UnreadableMessages::default(),
+            counted_events: 0,
+            left_out_from: None,
+            queued: 0,
+            played_until_ns: 0,
         };
         let (found, copies) = (player.new_chunks(), event_index::read(&mut player.container));
         let start_utc_ns = player.read_events(&found, copies);
@@ -201,6 +224,7 @@ impl Player {
     /// Continues at `time_ns`, forward or back, with the first tick or record not before it.
     pub fn seek(&mut self, time_ns: u64) {
         self.queue.clear();
+        (self.queued, self.played_until_ns) = (0, 0);
         self.from_ns = time_ns;
         self.sparse_until = None;
         let log_time = self.start_utc_ns.saturating_add(time_ns);
@@ -218,10 +242,8 @@ impl Player {
     /// Returns the bytes of an attached file, for example `config.toml`; none if no file has that name.
     pub fn attachment(&mut self, name: &str) -> Result<Option<Vec<u8>>, RecordingError> {
         for span in self.container.attachments.clone() {
-            let attachment = self
-                .container
-                .read_attachment(span)
-                .map_err(|source| RecordingError::Mcap { path: self.path.clone(), source })?;
+            let attachment =
+                self.container.read_attachment(span).map_err(|error| RecordingError::of_reading(&self.path, error))?;
             if attachment.name == name {
                 return Ok(Some(attachment.data.into_owned()));
             }
@@ -246,10 +268,6 @@ impl Player {
         self.duration_ns = end.saturating_sub(self.start_utc_ns);
     }
 
-    fn note(&mut self, trouble: &dyn std::error::Error) {
-        self.first_trouble.get_or_insert_with(|| trouble.to_string());
-    }
-
     /// Whether the mode changes in the tick of this time.
     fn changes_mode(&self, time_ns: u64) -> bool {
         let from = self.events.partition_point(|event| event.time_ns < time_ns);
@@ -263,6 +281,7 @@ impl Player {
         self.next_chunk += 1;
         let Some(records) = self.records_of(&chunk) else { return };
         let mut joiner = TickJoiner::default();
+        let mut errors = Vec::new();
         for (header, data) in records.messages().flatten() {
             let Some(topic) = self.container.topic(header.channel_id) else { continue };
             match topic {
@@ -279,16 +298,26 @@ impl Player {
             if self.sparse_until.is_some_and(left_out) && !self.changes_mode(time_ns) {
                 continue;
             }
+            if time_ns < self.played_until_ns {
+                // Played now, it would come after later ones.
+                errors.push((header.log_time, DecodeError::TooMany("messages of chunks of one time", MOST_EVENTS)));
+                continue;
+            }
             let played = match topic {
                 Topic::Tick => joiner.tick(&header, data).map(|tick| Some(Played::Tick(Box::new(tick)))),
                 _ => schema::decode(topic, data)
                     .map(|record| record.map(|record| Played::Record(Stamped { time_ns, record }))),
             };
             match played {
-                Ok(played) => self.queue.extend(played),
-                Err(error) => self.note(&error),
+                Ok(Some(played)) => {
+                    self.queued += played.weight();
+                    self.queue.push_back(played);
+                }
+                Ok(None) => {}
+                Err(error) => errors.push((header.log_time, error)),
             }
         }
+        self.unreadable.add(chunk.span.offset, errors);
         // Ticks and records come from two producers: a record may be written a little after ticks that are newer.
         self.queue.make_contiguous().sort_by_key(Played::time_ns);
     }
@@ -302,11 +331,17 @@ impl Iterator for Player {
         // An unread chunk may hold something earlier than the queue.
         while let Some(chunk) = self.chunks.get(self.next_chunk) {
             let starts = chunk.start.saturating_sub(self.start_utc_ns);
-            if self.queue.front().is_some_and(|first| first.time_ns() < starts) {
-                break;
+            match self.queue.front() {
+                Some(first) if first.time_ns() < starts => break,
+                Some(first) if self.queued >= MOST_EVENTS => {
+                    self.played_until_ns = first.time_ns();
+                    break;
+                }
+                _ => self.read_chunk(),
             }
-            self.read_chunk();
         }
-        self.queue.pop_front()
+        let played = self.queue.pop_front();
+        self.queued -= played.as_ref().map_or(0, Played::weight);
+        played
     }
 }
