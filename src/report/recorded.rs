@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::jump::{JumpCurves, JumpQuantities};
-use crate::recording::player::{Played, Player};
+use crate::recording::player::{MOST_TICKS_OF_A_ROLLOUT, Played, Player};
 use crate::recording::record::{Record, Stamped};
 use crate::recording::timeline::ended_trial;
 use crate::robot::description::RobotDescription;
@@ -38,7 +38,7 @@ pub struct Recordings {
     pub trials: BTreeMap<u32, RecordedTrial>,
     /// Trials of which ticks are recorded, also those that ended before the impulse.
     pub with_ticks: BTreeSet<u32>,
-    /// Those of them whose ticks are not whole: the program was killed in the trial, or a part of the file is lost.
+    /// Those of them whose last rollout is not whole: the program was killed in the trial, or a part of the file is lost.
     pub in_part: BTreeSet<u32>,
     /// Recordings that were read.
     pub files: Vec<PathBuf>,
@@ -71,7 +71,7 @@ impl Recordings {
         self.operators.extend(player.session().operator_in_words());
         self.with_ticks.extend(player.trials_with_ticks());
         let mut ticks: Vec<Tick> = Vec::new();
-        let mut ended = BTreeSet::new();
+        let (mut ended, mut too_long) = (BTreeSet::new(), BTreeSet::new());
         for played in player.by_ref() {
             let tick = match played {
                 Played::Tick(tick) => tick,
@@ -83,7 +83,9 @@ impl Recordings {
                     continue;
                 }
             };
-            if ticks.last().is_some_and(|last| last.trial != tick.trial) {
+            // In simulated time the rollouts of a trial with repeats abut.
+            let another = |last: &Tick| last.trial != tick.trial || tick.trial_time_s < last.trial_time_s;
+            if ticks.last().is_some_and(another) {
                 self.end(&mut ticks, robot, true);
             }
             if let Some(trial) = tick.trial {
@@ -91,17 +93,28 @@ impl Recordings {
                     // Another rollout of it begins.
                     ended.remove(&trial);
                 }
-                ticks.push(*tick);
+                if ticks.len() < MOST_TICKS_OF_A_ROLLOUT {
+                    ticks.push(*tick);
+                } else {
+                    too_long.insert(trial);
+                }
             }
         }
         let is_ended = ticks.last().and_then(|last| last.trial).is_some_and(|trial| ended.contains(&trial));
         self.end(&mut ticks, robot, is_ended);
+        for trial in too_long {
+            self.in_part.insert(trial);
+            let file = player.path().display();
+            let text =
+                format!("{file}: trial {trial} has more than {MOST_TICKS_OF_A_ROLLOUT} ticks; the others are left out");
+            self.damages.push(text);
+        }
         let lost_before = player.lost_before_recovery();
         self.damages.extend(lost_before.into_iter().map(|lost| format!("{}: {lost}", player.path().display())));
         self.damages.extend(player.damage());
     }
 
-    /// Takes over the ticks of a trial; `is_ended`: the recording goes on after them or reports the trial's end.
+    /// Takes over the ticks of a rollout; `is_ended`: the recording goes on after them or reports the trial's end.
     fn end(&mut self, ticks: &mut Vec<Tick>, robot: &RobotDescription, is_ended: bool) {
         if let Some(trial) = ticks.last().and_then(|tick| tick.trial) {
             let is_whole = is_ended && ticks.windows(2).all(|pair| pair[1].number == pair[0].number + 1);

@@ -145,11 +145,55 @@ pub fn limits_of(robot: &RobotDescription) -> [[f64; 3]; 2] {
     [least(&robot.limits.max_torque), least(&robot.limits.max_velocity)]
 }
 
-/// Returns the studies by task, in the order of the tasks; those of other programs come last, each by itself.
-pub fn by_task(studies: &[ReportedStudy]) -> Vec<Vec<&ReportedStudy>> {
-    let of = |task: Task| studies.iter().filter(move |study| study.task == Some(task)).collect::<Vec<_>>();
-    let others = studies.iter().filter(|study| study.task.is_none()).map(|study| vec![study]);
-    Task::ALL.into_iter().map(of).filter(|group| !group.is_empty()).chain(others).collect()
+/// Studies whose values can be compared: of one task, one unit of J, and either of one jump or of jumps in a row.
+#[derive(Debug, Clone)]
+pub struct StudyGroup<'a> {
+    /// Name of the task, with the unit and the kind where other groups of the task differ in them; or of a study of another program.
+    pub name: String,
+    /// Studies, at least one.
+    pub studies: Vec<&'a ReportedStudy>,
+}
+
+impl StudyGroup<'_> {
+    /// Name with the unit of J.
+    pub fn name_with_unit(&self) -> String {
+        let unit = &self.studies[0].unit;
+        let is_named = unit.is_empty() || self.name.ends_with(&in_unit(unit));
+        if is_named { self.name.clone() } else { format!("{} ({unit})", self.name) }
+    }
+}
+
+fn in_unit(unit: &str) -> String {
+    format!(" in {unit}")
+}
+
+/// Returns the groups of the studies in the order of the tasks; studies of other programs come last, each by itself.
+pub fn groups(studies: &[ReportedStudy]) -> Vec<StudyGroup<'_>> {
+    let of_task = |task: Task| {
+        let mut kinds: Vec<(&str, bool, Vec<&ReportedStudy>)> = Vec::new();
+        for study in studies.iter().filter(|study| study.task == Some(task)) {
+            let (unit, in_a_row) = (study.unit.as_str(), study.jumps > 1);
+            match kinds.iter_mut().find(|kind| (kind.0, kind.1) == (unit, in_a_row)) {
+                Some(kind) => kind.2.push(study),
+                None => kinds.push((unit, in_a_row, vec![study])),
+            }
+        }
+        let several_units = kinds.iter().any(|kind| kind.0 != kinds[0].0);
+        let several_kinds = kinds.iter().any(|kind| kind.1 != kinds[0].1);
+        let group = move |(unit, in_a_row, studies): (&str, bool, _)| {
+            let kind = match in_a_row {
+                _ if !several_kinds => "",
+                true => " of jumps in a row",
+                false => " of one jump",
+            };
+            let unit = if several_units { in_unit(unit) } else { String::new() };
+            StudyGroup { name: format!("{}{kind}{unit}", task.name()), studies }
+        };
+        kinds.into_iter().map(group)
+    };
+    let others = studies.iter().filter(|study| study.task.is_none());
+    let others = others.map(|study| StudyGroup { name: study.name.clone(), studies: vec![study] });
+    Task::ALL.into_iter().flat_map(of_task).chain(others).collect()
 }
 
 /// Mean and standard deviation of a sample (n - 1); the deviation is 0 for one value, both are not a number for none.
@@ -157,7 +201,12 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-    (mean, if values.len() > 1 { (squares / (count - 1.0)).sqrt() } else { squares })
+    let deviation = match values.len() {
+        0 => f64::NAN,
+        1 => squares,
+        _ => (squares / (count - 1.0)).sqrt(),
+    };
+    (mean, deviation)
 }
 
 /// Returns mean and deviation of the best so far after each trial, as far as every study has a value.

@@ -2,7 +2,7 @@
 
 use super::figure::{Axis, FALL_STYLE, Figure, Panel, Series, Shape};
 use super::jump::JumpCurves;
-use super::study::{ReportedStudy, TrialChoice, mean_best_so_far};
+use super::study::{ReportedStudy, StudyGroup, TrialChoice, mean_best_so_far};
 use crate::control::force_profile::{Oscillator, amplitudes_leg, force_leg};
 use crate::robot::{JOINT_NAMES, Leg};
 use crate::trial::{ExpectedResult, TrialRecord, Verdict};
@@ -14,12 +14,12 @@ const TOUCHDOWN_STYLE: usize = 5;
 /// Points of a force profile.
 const PROFILE_POINTS: usize = 200;
 
-/// Studies of one task, and the name of the task in file names and captions.
-pub struct TaskStudies<'a> {
+/// Figures of a group of studies.
+pub struct GroupFigures<'a> {
     /// Studies, at least one.
     pub studies: &'a [&'a ReportedStudy],
-    /// Name of the task, or of the only study.
-    pub name: String,
+    /// Name of the group in file names and captions.
+    pub name: &'a str,
 }
 
 /// A trial that is drawn over time: its row, its label, and its curves if its ticks were recorded.
@@ -49,13 +49,10 @@ pub fn drawn<'a>(study: &'a ReportedStudy, choices: &[TrialChoice]) -> Vec<Drawn
     drawn
 }
 
-impl<'a> TaskStudies<'a> {
-    /// Studies of one task.
-    pub fn new(studies: &'a [&'a ReportedStudy]) -> TaskStudies<'a> {
-        let name = studies.first().map_or_else(String::new, |study| {
-            study.task.map_or_else(|| study.name.clone(), |task| task.name().to_owned())
-        });
-        TaskStudies { studies, name }
+impl<'a> GroupFigures<'a> {
+    /// Figures of a group.
+    pub fn new(group: &'a StudyGroup<'a>) -> GroupFigures<'a> {
+        GroupFigures { studies: &group.studies, name: &group.name }
     }
 
     /// Name for a file: lower-case letters, digits and hyphens.

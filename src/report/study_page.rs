@@ -1,8 +1,10 @@
 //! The page of one or several studies.
 
+use std::collections::BTreeSet;
+
 use super::page::{Block, Page, Section};
-use super::study::{ReportedStudy, TrialChoice, by_task};
-use super::study_figures::{DrawnTrial, TaskStudies, drawn};
+use super::study::{ReportedStudy, StudyGroup, TrialChoice, groups};
+use super::study_figures::{DrawnTrial, GroupFigures, drawn};
 use super::study_tables::{self as tables, title};
 use super::table::{self, changed_bounds};
 use crate::optimize::ask::Direction;
@@ -11,7 +13,7 @@ use crate::trial::{ParameterInfo, Task, counted, six_digits};
 /// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn; `version`: that of the program
 /// that writes the report, with its commit.
 pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -> Page {
-    let groups = by_task(studies);
+    let groups = groups(studies);
     let name = match studies {
         [only] => format!("Study {}", title(only)),
         several => format!("{} studies", several.len()),
@@ -22,7 +24,7 @@ pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -
     page.sections.push(results(studies, &groups));
     let mut trials = Section::new("Parameters and landings");
     for group in &groups {
-        let figures = TaskStudies::new(group);
+        let figures = GroupFigures::new(group);
         trials.blocks.extend([figures.parameters(), figures.landings()].map(Block::Figure));
     }
     page.sections.push(trials);
@@ -32,13 +34,27 @@ pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -
     page.sections.push(verdicts(studies));
     page.sections.push(configuration(studies));
     page.sections.push(recordings(studies));
+    number_repeated_names(&mut page);
     page
+}
+
+/// Numbers the names of figures that are there already: studies of two journals may have one name. A name is that of a file.
+fn number_repeated_names(page: &mut Page) {
+    let mut known = BTreeSet::new();
+    for block in page.sections.iter_mut().flat_map(|section| &mut section.blocks) {
+        let Block::Figure(figure) = block else { continue };
+        let own = figure.name.clone();
+        let numbered = (2..).map(|number| format!("{own}-{number}"));
+        figure.name = std::iter::once(own.clone()).chain(numbered).find(|name| !known.contains(name)).unwrap_or(own);
+        known.insert(figure.name.clone());
+    }
 }
 
 /// Returns the tables of a running study: objective, results, falls and trials.
 pub fn summary(study: &ReportedStudy) -> Page {
     let studies = std::slice::from_ref(study);
-    let sections = vec![objective(&by_task(studies)), results(studies, &by_task(studies)), verdicts(studies)];
+    let groups = groups(studies);
+    let sections = vec![objective(&groups), results(studies, &groups), verdicts(studies)];
     Page { sections, ..Page::new(format!("Study {}", title(study)), place(study)) }
 }
 
@@ -64,9 +80,9 @@ fn equation(task: Task, jumps: u32, unit: &str) -> String {
     }
 }
 
-fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
+fn objective(groups: &[StudyGroup]) -> Section {
     let mut section = Section::new("Objective");
-    for study in groups.iter().map(|group| group[0]) {
+    for study in groups.iter().map(|group| group.studies[0]) {
         match study.task {
             Some(task) => section.blocks.push(Block::Equation(equation(task, study.jumps, &study.unit))),
             None => {
@@ -75,7 +91,7 @@ fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
             }
         }
     }
-    if groups.iter().any(|group| group[0].task.is_some()) {
+    if groups.iter().any(|group| group.studies[0].task.is_some()) {
         section.paragraph(
             "J is maximized. The initial values are read when the impulse begins, the final ones when the robot has come to \
              rest, both in the world frame turned so that the trial starts at yaw 0; yaw is unwrapped. A fall gives J = 0 \
@@ -85,35 +101,35 @@ fn objective(groups: &[Vec<&ReportedStudy>]) -> Section {
     section
 }
 
-fn results(studies: &[ReportedStudy], groups: &[Vec<&ReportedStudy>]) -> Section {
+fn results(studies: &[ReportedStudy], groups: &[StudyGroup]) -> Section {
     let mut section = Section::new("Results");
     section.blocks.push(Block::Table(tables::studies(studies)));
     section.blocks.extend(tables::checkpoints(groups).map(Block::Table));
     for group in groups {
-        section.blocks.push(Block::Figure(TaskStudies::new(group).convergence()));
+        section.blocks.push(Block::Figure(GroupFigures::new(group).convergence()));
         let best = tables::best(group);
         if best.rows.is_empty() {
-            section.paragraph(format!("No trial of {} was accepted.", title(group[0])));
+            section.paragraph(format!("No trial of {} was accepted.", group.name));
         } else {
             section.blocks.push(Block::Table(best));
         }
-        for study in group.iter().filter(|study| !study.other_gains_of_best.is_empty()) {
+        for study in group.studies.iter().filter(|study| !study.other_gains_of_best.is_empty()) {
             section.paragraph(format!("Best trial of {}, {}.", title(study), study.other_gains_of_best));
         }
-        for study in group {
+        for study in &group.studies {
             if let Some(confirmation) = &study.confirmation {
                 section.paragraph(format!("Confirmation of the best of {}: {confirmation}.", title(study)));
             }
         }
-        section.blocks.extend(tables::expectations(group).map(Block::Table));
-        section.blocks.extend(TaskStudies::new(group).expectations().map(Block::Figure));
+        section.blocks.extend(tables::expectations(&group.studies).map(Block::Table));
+        section.blocks.extend(GroupFigures::new(group).expectations().map(Block::Figure));
     }
     section
 }
 
-/// Motion, force, torque and power of chosen trials of the best study of a task.
-fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
-    let figures = TaskStudies::new(group);
+/// Motion, force, torque and power of chosen trials of the best study of a group.
+fn jumps(group: &StudyGroup, choices: &[TrialChoice]) -> Section {
+    let figures = GroupFigures::new(group);
     let mut section = Section::new(format!("Jumps, {}", figures.name));
     // The best study with ticks; without ticks the best study.
     let rank = |study: &&&ReportedStudy| {
@@ -121,7 +137,7 @@ fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
         let value = if study.direction == Direction::Minimize { -value } else { value };
         (!study.recordings.trials.is_empty(), value)
     };
-    let best = group.iter().max_by(|a, b| {
+    let best = group.studies.iter().max_by(|a, b| {
         let (a, b) = (rank(a), rank(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     });
@@ -132,7 +148,11 @@ fn jumps(group: &[&ReportedStudy], choices: &[TrialChoice]) -> Section {
         return section;
     }
     let labels: Vec<&str> = trials.iter().map(|trial| trial.label.as_str()).collect();
-    let of = if group.len() > 1 { format!(" of {}, the best study with ticks", study.label()) } else { String::new() };
+    let of = if group.studies.len() > 1 {
+        format!(" of {}, the best study with ticks", study.label())
+    } else {
+        String::new()
+    };
     section.paragraph(format!("Trials shown{of}: {}.", labels.join("; ")));
     section.paragraph(ticks(study, &trials));
     section.blocks.extend(figures.force(study, &trials).map(Block::Figure));

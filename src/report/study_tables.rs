@@ -1,7 +1,7 @@
 //! Tables of studies.
 
 use super::page::{Cell, Column, Table};
-use super::study::{ReportedStudy, mean_and_deviation};
+use super::study::{ReportedStudy, StudyGroup, mean_and_deviation};
 use super::study_figures::DrawnTrial;
 use crate::robot::JOINT_NAMES;
 use crate::trial::{Task, TrialRecord, Verdict, counted as in_words, parameter_unit};
@@ -81,21 +81,21 @@ pub fn title(study: &ReportedStudy) -> String {
     study.task.map_or_else(|| study.name.clone(), |task| format!("{}, {}", task.name(), study.label()))
 }
 
-/// Best so far after some numbers of trials, mean and deviation over the studies of each task; none without a trial that counts.
-pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
-    let longest =
-        groups.iter().flatten().map(|study| study.best_so_far().len()).max().filter(|longest| *longest > 0)?;
+/// Best so far after some numbers of trials, mean and deviation over the studies of each group; none without a trial that counts.
+pub fn checkpoints(groups: &[StudyGroup]) -> Option<Table> {
+    let studies = || groups.iter().flat_map(|group| &group.studies);
+    let longest = studies().map(|study| study.best_so_far().len()).max().filter(|longest| *longest > 0)?;
     let mut at: Vec<usize> = CHECKPOINTS.into_iter().filter(|count| *count < longest).collect();
     at.push(longest);
     let columns = [Column::text("task"), Column::number("studies", "")].into_iter();
     let columns = columns.chain(at.iter().map(|count| Column::number(in_words(*count, "trial"), "")));
     let caption = format!(
         "Best value of a single trial so far: mean and standard deviation over the studies, in the unit of J.{}",
-        explained(groups.iter().flatten().flat_map(|study| study.best_so_far_rows()).flatten())
+        explained(studies().flat_map(|study| study.best_so_far_rows()).flatten())
     );
     let mut table = Table::new(caption, columns);
     for group in groups {
-        let curves: Vec<Vec<_>> = group.iter().map(|study| study.best_so_far_rows().collect()).collect();
+        let curves: Vec<Vec<_>> = group.studies.iter().map(|study| study.best_so_far_rows().collect()).collect();
         let cell = |count: &usize| {
             let at = |curve: &Vec<Option<&TrialRecord>>| {
                 let best = curve.get(*count - 1).copied().flatten()?;
@@ -110,10 +110,8 @@ pub fn checkpoints(groups: &[Vec<&ReportedStudy>]) -> Option<Table> {
                 Cell::text(format!("{mean:.3}{spread}{mark}"))
             })
         };
-        let name = group[0].task.map_or_else(|| group[0].name.clone(), |task| task.name().to_owned());
-        let unit = &group[0].unit;
-        let name = if unit.is_empty() { name } else { format!("{name} ({unit})") };
-        let cells = [Cell::text(name), Cell::count(group.len())].into_iter().chain(at.iter().map(cell));
+        let cells = [Cell::text(group.name_with_unit()), Cell::count(group.studies.len())].into_iter();
+        let cells = cells.chain(at.iter().map(cell));
         table.rows.push(cells.collect());
     }
     Some(table)
@@ -155,9 +153,8 @@ pub fn expectations(studies: &[&ReportedStudy]) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// The best trial of each study of one task.
-pub fn best(group: &[&ReportedStudy]) -> Table {
-    let name = group[0].task.map_or(group[0].name.as_str(), |task| task.name());
+/// The best trial of each study of a group.
+pub fn best(StudyGroup { name, studies: group }: &StudyGroup) -> Table {
     let columns = [Column::text("study"), Column::number("trial", ""), Column::number("J", group[0].unit.as_str())];
     let by_model = group.iter().any(|study| study.model_best.is_some());
     let model = ["mean by the model", "deviation"].map(|label| Column::number(label, group[0].unit.as_str()));

@@ -17,13 +17,14 @@ pub fn padded(values: &[f64], share: f64) -> [f64; 2] {
 }
 
 /// Returns the multiples of 1, 2 or 5 times a power of ten within the range, about `most` of them: those of the smallest step
-/// that gives no more, or of the next smaller one where it would give one tick, which shows no scale.
+/// that gives no more, or of the next smaller one where it would give one tick, which shows no scale. None for a range that is empty, not finite or too
+/// narrow for numbers between its ends.
 pub fn round_ticks([low, high]: [f64; 2], most: usize) -> Vec<f64> {
-    let width = high - low;
-    if width.is_nan() || width <= 0.0 || !width.is_finite() {
+    let rough = (high - low) / most.max(1) as f64;
+    // The power of ten of a smaller step would be 0.
+    if !rough.is_finite() || rough < f64::MIN_POSITIVE {
         return Vec::new();
     }
-    let rough = width / most.max(1) as f64;
     let power = 10f64.powf(rough.log10().floor());
     let multiples = |factor: f64| -> Vec<f64> {
         let step = factor * power;

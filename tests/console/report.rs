@@ -276,6 +276,41 @@ fn the_recorded_trial_of_a_study_without_a_screen_is_whole() {
     );
 }
 
+/// Regression: the rollouts of a trial were one: "in part", with the torques of all and curves that ran back in time.
+#[test]
+fn the_rollouts_of_a_trial_with_repeats_are_apart() {
+    let program = Program::new();
+    program.write("config/control.toml", "[tasks.forward]\nrepeats = 2\n");
+    program.text(&["optimize", "--trials", "3", "--record", "all", "--config", "config"]);
+    let study = program.study("recordings").to_str().unwrap().to_owned();
+    let page = page(&program, &[&study, "--trials", "0,1,2"]);
+    assert_eq!(column(table(&page, "Trials of"), "ticks"), ["yes"; 3]);
+    let motion = blocks(&page, "figure").into_iter().find(|figure| figure["name"] == "forward-motion").unwrap();
+    for series in motion["panels"].as_array().unwrap().iter().flat_map(|panel| panel["series"].as_array().unwrap()) {
+        let points = series["shape"]["line"].as_array().unwrap();
+        let time_s = |point: &Value| point[0].as_f64().unwrap();
+        assert!(points.windows(2).all(|pair| time_s(&pair[0]) <= time_s(&pair[1])), "{}", series["label"]);
+    }
+}
+
+/// Regression: the figures of two studies of one name were written into one file, and their identifiers in the page were one.
+#[test]
+fn figures_of_studies_of_one_name_have_names_of_their_own() {
+    let program = Program::new();
+    for journal in ["a.log", "b.log"] {
+        program.write(journal, include_str!("../golden/tpe/journal.log"));
+    }
+    program.text(&["report", "a.log", "b.log", "--figures", "figures", "--output", "page.html"]);
+    let files = svgs(&program.path("figures"));
+    let html = fs::read_to_string(program.path("page.html")).unwrap();
+    assert_eq!(files.len(), html.matches("<figure id=").count());
+    assert_eq!(files.iter().filter(|(file, _)| file.ends_with("-2.svg")).count(), files.len() / 2, "{:?}", files.len());
+    for (file, _) in &files {
+        let id = file.strip_suffix(".svg").unwrap();
+        assert_eq!(html.matches(&format!("<figure id=\"{id}\"")).count(), 1, "{id}");
+    }
+}
+
 #[test]
 fn a_hardware_like_study_lists_the_keys_that_differ() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/hardware_like");

@@ -6,7 +6,7 @@ use quadfrog::recording::record::{Record, SessionInfo, Stamped};
 use quadfrog::recording::writer::Writer;
 use quadfrog::report::jump::{JumpCurves, JumpQuantities, force_angle_rad};
 use quadfrog::report::recorded::{RecordedTrial, Recordings};
-use quadfrog::report::study::{ReportedStudy, TrialChoice, mean_and_deviation, mean_best_so_far};
+use quadfrog::report::study::{ReportedStudy, TrialChoice, groups, mean_and_deviation, mean_best_so_far};
 use quadfrog::report::{study_page, table, text};
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::telemetry::Tick;
@@ -133,6 +133,37 @@ fn best_so_far_counts_accepted_trials_alone() {
     assert_eq!(mean[0].0, 2);
     assert!((mean[0].1 - 0.4).abs() < 1e-12 && (mean[0].2 - 0.02f64.sqrt()).abs() < 1e-12);
     assert_eq!(mean_and_deviation(&[3.0]), (3.0, 0.0));
+    // Regression: the deviation of no values was 0.
+    let (mean, deviation) = mean_and_deviation(&[]);
+    assert!(mean.is_nan() && deviation.is_nan());
+}
+
+/// Regression: the values of a study in m, of one in m/s and of one in m per jump had one mean.
+#[test]
+fn studies_of_another_unit_or_of_several_jumps_are_groups_of_their_own() {
+    let studies = [
+        study(0, vec![row(0, Verdict::Accept, 0.6)]),
+        ReportedStudy { unit: "m/s".into(), ..study(1, vec![row(0, Verdict::Accept, 1.4)]) },
+        ReportedStudy { jumps: 3, ..study(2, vec![row(0, Verdict::Accept, 0.3)]) },
+        study(3, vec![row(0, Verdict::Accept, 0.8)]),
+    ];
+    let names = |studies| groups(studies).into_iter().map(|group| group.name_with_unit()).collect::<Vec<_>>();
+    assert_eq!(
+        names(&studies),
+        ["forward of one jump in m", "forward of one jump in m/s", "forward of jumps in a row in m"]
+    );
+    assert_eq!(names(&studies[..2]), ["forward in m", "forward in m/s"]);
+    assert_eq!(names(&studies[2..]), ["forward of jumps in a row (m)", "forward of one jump (m)"]);
+    assert_eq!(names(&studies[..1]), ["forward (m)"]);
+    let page = study_page::page(&studies[..3], &[], "0.1.0 (test)");
+    let shown = text::render(&page, 200);
+    assert!(!shown.contains("+-"), "{shown}");
+    let figures: Vec<&str> = page.figures().map(|figure| figure.name.as_str()).collect();
+    for name in ["forward-of-one-jump-in-m-s-convergence", "forward-of-jumps-in-a-row-in-m-convergence"] {
+        assert!(figures.contains(&name), "{figures:?}");
+    }
+    let both = study_page::page(&[studies[0].clone(), studies[3].clone()], &[], "0.1.0 (test)");
+    assert!(text::render(&both, 200).contains("0.700 +- 0.141"));
 }
 
 /// Regression: the table of the best value so far had a column `0 trials` with nothing in it, or a column `1 trials`.

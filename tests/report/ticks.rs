@@ -27,4 +27,9 @@ fn an_axis_has_a_width_for_any_values() {
         assert!(low < high, "{values:?}");
         assert!(!round_ticks([low, high], 6).is_empty(), "{values:?}");
     }
+    // Regression: the power of ten of the step was 0, and every whole number a tick.
+    for high in [5e-324, 1e-310, f64::MIN_POSITIVE] {
+        assert!(round_ticks([0.0, high], 6).is_empty(), "{high:e}");
+    }
+    assert!(round_ticks([f64::MIN, f64::MAX], 6).is_empty());
 }

@@ -26,6 +26,10 @@ pub use lost::LostPart;
 use lost::{DamagedChunk, UnreadableMessages};
 use tick_joiner::TickJoiner;
 
+/// Most ticks of one rollout that a reader keeps, 2.4 kB each: 1,000 s. The longest `duration_s` is 600 s, countdown and settling
+/// take 60 s at most.
+pub const MOST_TICKS_OF_A_ROLLOUT: usize = 1_000_000;
+
 /// A played tick or record.
 #[expect(clippy::large_enum_variant, reason = "records are few; the many ticks are boxed")]
 #[derive(Debug, Clone, PartialEq)]
