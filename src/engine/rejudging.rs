@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::verify::attached_configuration;
+use super::verify::{VerifyError, attached_config, attached_robot};
 use crate::config::{Config, ConfigError};
 use crate::control::estimator::Estimator;
 use crate::control::leg;
 use crate::control::settings::ControlSettings;
 use crate::recording::RecordingError;
-use crate::recording::player::Played;
+use crate::recording::player::{MOST_TICKS_OF_A_ROLLOUT, Played};
 use crate::recording::timeline::Timeline;
 use crate::robot::description::RobotDescription;
 use crate::session::rejudge::{Judgement, rejudge, row_of_repeat};
@@ -94,6 +94,8 @@ struct PresentTrial {
     /// Ticks of the rollout, with the recorded positions.
     ticks: Vec<Tick>,
     recorded_world: Vec<Vector3<f64>>,
+    /// Whether the rollout has more ticks than are kept.
+    is_too_long: bool,
     judged: Vec<Judgement>,
     estimate: EstimateChange,
 }
@@ -111,15 +113,20 @@ impl Rejudging {
         let (Some(task), Some(backend)) = (info.task, info.backend) else {
             return Err(refuse("it names a task or a backend that this version does not know".into()));
         };
-        let attached = attached_configuration(recording.first_player());
-        let robot = match (&attached, RobotDescription::embedded(&info.robot)) {
-            (Ok((_, robot)), _) => robot.clone(),
+        let robot = match attached_robot(recording.first_player()) {
+            Ok(robot) => robot,
             // An older recording has no robot of its own.
-            (Err(_), Ok(robot)) => robot,
-            (Err(error), Err(_)) => return Err(refuse(format!("its robot {} is not known: {error}", info.robot))),
+            Err(VerifyError::NotAttached { .. }) => RobotDescription::embedded(&info.robot)
+                .map_err(|error| refuse(format!("its robot {} is not known: {error}", info.robot)))?,
+            Err(error) => return Err(refuse(format!("its robot cannot be read: {error}"))),
         };
         let settings = config.settings(&robot, task, backend)?;
-        let recorded = attached.ok().and_then(|(config, robot)| config.settings(&robot, task, backend).ok());
+        let recorded = match attached_config(recording.first_player()) {
+            Ok(config) => config.settings(&robot, task, backend).ok(),
+            Err(VerifyError::Recording(error)) => return Err(error.into()),
+            // That of an older version may be missing, or not valid any more.
+            Err(_) => None,
+        };
         let estimation = |s: &ControlSettings| (s.estimator, s.objective, s.contact_force_n);
         let same = recorded.as_ref().is_some_and(|recorded| estimation(recorded) == estimation(&settings));
         let control = config.task(task);
@@ -176,7 +183,9 @@ impl Rejudging {
             let feet = leg::feet(&self.settings.geometry, &tick.state.joint_position_rad);
             tick.estimate = *estimator.update(&tick.state, &feet, &self.settings);
         }
-        if tick.trial.is_some() {
+        if tick.trial.is_some() && self.present.ticks.len() == MOST_TICKS_OF_A_ROLLOUT {
+            self.present.is_too_long = true;
+        } else if tick.trial.is_some() {
             self.present.trial = tick.trial;
             self.present.ticks.push(tick);
             self.present.recorded_world.push(recorded_world);
@@ -186,10 +195,11 @@ impl Rejudging {
 
     /// Judges the ticks of the rollout that has ended.
     fn end_rollout(&mut self) {
-        let PresentTrial { trial, ticks, recorded_world, judged, estimate } = &mut self.present;
+        let PresentTrial { trial, ticks, recorded_world, is_too_long, judged, estimate } = &mut self.present;
         let found = trial.and_then(|trial| Some((self.rows.get(&trial)?, self.rules.get(&trial)?)));
         if let (Some((row, rule)), false) = (found, ticks.is_empty()) {
             judged.push(match row.repeats.get(judged.len()) {
+                _ if *is_too_long => Judgement::unknown(format!("it has more than {MOST_TICKS_OF_A_ROLLOUT} ticks")),
                 Some(repeat) => rejudge(&row_of_repeat(row, repeat), ticks, rule, &self.settings),
                 None => rejudge(row, ticks, rule, &self.settings),
             });
@@ -203,6 +213,7 @@ impl Rejudging {
         }
         ticks.clear();
         recorded_world.clear();
+        *is_too_long = false;
     }
 
     /// Returns the judgement of the trial that has ended; none of one that was never measured.

@@ -58,6 +58,11 @@ pub enum VerifyError {
     Recording(#[from] RecordingError),
     #[error("{}: not verifiable: it has no tick of a trial that came to its own end", path.display())]
     NoTrial { path: PathBuf },
+    #[error(
+        "{}: not verifiable: {name} is not attached; it was recorded by an older version, or copied without it",
+        path.display()
+    )]
+    NotAttached { path: PathBuf, name: String },
     #[error("{}: not verifiable: {reason}", path.display())]
     NotVerifiable { path: PathBuf, reason: String },
 }
@@ -127,7 +132,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
         None => return Err(refuse("its backend is not known to this version".into())),
     }
     let Some(task) = session.task else { return Err(refuse("its task is not known to this version".into())) };
-    let (config, robot) = attached_configuration(&mut player)?;
+    let (config, robot) = (attached_config(&mut player)?, attached_robot(&mut player)?);
     let rows = rows(&player);
     let damaged =
         |player: &Player| player.damage().map_or(Ok(()), |damage| Err(refuse(format!("it is damaged: {damage}"))));
@@ -184,35 +189,46 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     Ok(Verification::Equal { trials, ticks, left_out })
 }
 
-/// Returns the configuration and the robot that are attached to a recording.
+/// Returns the text of an attached file.
+fn attached_text(player: &mut Player, name: &str) -> Result<String, VerifyError> {
+    let path = player.path().to_owned();
+    let bytes = player.attachment(name)?;
+    let bytes = bytes.ok_or_else(|| VerifyError::NotAttached { path: path.clone(), name: name.to_owned() })?;
+    let reason = format!("the attached {name} is not UTF-8");
+    String::from_utf8(bytes).map_err(|_| VerifyError::NotVerifiable { path, reason })
+}
+
+/// Returns the configuration that is attached to a recording.
 ///
 /// # Errors
-/// When one of their files is missing, damaged or not valid any more.
-pub fn attached_configuration(player: &mut Player) -> Result<(Config, RobotDescription), VerifyError> {
-    let path = &player.path().to_owned();
-    let refuse = |reason: String| VerifyError::NotVerifiable { path: path.into(), reason };
-    let mut text = |name: &str| -> Result<String, VerifyError> {
-        let missing =
-            || refuse(format!("{name} is not attached; it was recorded by an older version, or copied without it"));
-        let bytes = player.attachment(name)?.ok_or_else(missing)?;
-        String::from_utf8(bytes).map_err(|_| refuse(format!("the attached {name} is not UTF-8")))
-    };
+/// When one of its files is not attached, damaged or not valid any more.
+pub fn attached_config(player: &mut Player) -> Result<Config, VerifyError> {
+    let path = player.path().to_owned();
     let files = Config::FILE_NAMES;
-    let texts = files.iter().map(|name| Ok((*name, text(name)?))).collect::<Result<Vec<_>, VerifyError>>()?;
+    let texts = files.iter().map(|name| Ok((*name, attached_text(player, name)?)));
+    let texts = texts.collect::<Result<Vec<_>, VerifyError>>()?;
     let origins: Vec<String> = files.iter().map(|name| format!("{}: attached {name}", path.display())).collect();
     let layers = texts.iter().zip(&origins).map(|((file, text), origin)| ConfigLayer { file, origin, text });
-    let config = Config::layered(&layers.collect::<Vec<_>>()).map_err(|error| refuse(error.to_string()))?;
+    let config = Config::layered(&layers.collect::<Vec<_>>());
+    config.map_err(|error| VerifyError::NotVerifiable { path, reason: error.to_string() })
+}
 
+/// Returns the robot that is attached to a recording.
+///
+/// # Errors
+/// When one of its files is not attached, damaged or not valid any more.
+pub fn attached_robot(player: &mut Player) -> Result<RobotDescription, VerifyError> {
     #[derive(Deserialize)]
     struct UrdfName {
         urdf: String,
     }
-    let toml = text("robot.toml")?;
+    let path = &player.path().to_owned();
+    let refuse = |reason: String| VerifyError::NotVerifiable { path: path.into(), reason };
+    let toml = attached_text(player, "robot.toml")?;
     let name: UrdfName = toml::from_str(&toml).map_err(|error| refuse(format!("the attached robot.toml: {error}")))?;
     let base = Path::new(&name.urdf).file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let urdf = text(&base)?;
-    let robot = RobotFiles::from_texts(path, toml, urdf).description().map_err(|error| refuse(error.to_string()))?;
-    Ok((config, robot))
+    let urdf = attached_text(player, &base)?;
+    RobotFiles::from_texts(path, toml, urdf).description().map_err(|error| refuse(error.to_string()))
 }
 
 /// Returns the newest row of each trial.

@@ -120,3 +120,16 @@ fn a_trial_that_fell_and_would_not_fall_has_no_verdict() {
         assert_shows(row["new"]["cause"].as_str().unwrap(), &["the recording ends where it fell before"]);
     }
 }
+
+/// Regression: damaged files of the robot were replaced by the built-in robot of its name, without a word.
+#[test]
+fn a_recording_whose_robot_is_damaged_is_not_judged_by_another_one() {
+    let (program, study) = recorded();
+    let mut bytes = fs::read(study.join("session.mcap")).unwrap();
+    let urdf = b"<robot name=";
+    let at = bytes.windows(urdf.len()).position(|bytes| bytes == urdf).expect("the attached description");
+    bytes[at + 200] ^= 1;
+    fs::write(program.path("damaged.mcap"), bytes).unwrap();
+    let refused = program.refused(&["rejudge", "damaged.mcap"]);
+    assert_shows(&refused, &["damaged.mcap: not judged again: its robot cannot be read", "Attachment CRC failed"]);
+}

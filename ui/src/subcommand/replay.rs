@@ -7,13 +7,13 @@ use std::sync::PoisonError;
 use crate::app::{self, ConsoleExit};
 use crate::feed::Feed;
 use crate::model::RobotFacts;
-use crate::{put_line, terminal};
+use crate::{notice, put_line, terminal};
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::config::Config;
-use quadfrog::engine::{Rejudging, attached_configuration, running_session};
+use quadfrog::engine::{Rejudging, VerifyError, attached_config, attached_robot, running_session};
 use quadfrog::recording::RecordingError;
-use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::player::{Played, Player, is_recoverable};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
@@ -88,10 +88,13 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         damage
     };
     let repair = |damage: Vec<String>| {
-        let damaged = files.iter().filter(|file| damage.iter().any(|line| line.starts_with(&named_in(file))));
+        let is_of = |file: &Path, line: &String| line.starts_with(&named_in(file)) && is_recoverable(line);
+        let damaged = files.iter().filter(|file| damage.iter().any(|line| is_of(file, line)));
         let commands: Vec<String> = damaged.map(|file| format!("quadfrog recover {}", file.display())).collect();
+        let remedy =
+            if commands.is_empty() { String::new() } else { format!("\n{} repairs it", commands.join(" and ")) };
         let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
-        Failure::Other(anyhow!("{}\n{} repairs it", damage.collect::<Vec<_>>().join("\n"), commands.join(" and ")))
+        Failure::Other(anyhow!("{}{remedy}", damage.collect::<Vec<_>>().join("\n")))
     };
     terminal::check().map_err(|error| match damage_of(recording.damage()) {
         damage if damage.is_empty() => Failure::input(error),
@@ -108,14 +111,25 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
 }
 
-/// Returns what a recording tells of its robot. Of an older one, without its files: the built-in robot of that name, or nothing;
-/// the panels that need the robot's limits say so.
+/// Returns what a recording tells of its robot. Of an older one, without its files: the built-in robot of that name. Of one whose
+/// files cannot be read: nothing, and a line on standard error; the panels that need the robot's limits say so.
 pub fn recorded_robot(recording: &mut Timeline) -> RobotFacts {
-    let attached = attached_configuration(recording.first_player());
+    let robot = match attached_robot(recording.first_player()) {
+        Ok(robot) => robot,
+        Err(VerifyError::NotAttached { .. }) => {
+            let description = RobotDescription::embedded(&recording.session().robot).ok();
+            return RobotFacts { description, ..RobotFacts::default() };
+        }
+        Err(error) => {
+            notice!("its robot cannot be read and is not shown: {error}");
+            return RobotFacts::default();
+        }
+    };
+    let config = attached_config(recording.first_player());
     let session = recording.session();
-    match (attached, session.backend) {
-        (Ok((config, robot)), Some(backend)) => RobotFacts::new(robot, &config, backend, session.seed),
-        _ => RobotFacts { description: RobotDescription::embedded(&session.robot).ok(), ..RobotFacts::default() },
+    match (config, session.backend) {
+        (Ok(config), Some(backend)) => RobotFacts::new(robot, &config, backend, session.seed),
+        _ => RobotFacts { description: Some(robot), ..RobotFacts::default() },
     }
 }
 
@@ -140,20 +154,30 @@ impl From<RecordingError> for Failure {
     }
 }
 
-/// Reads every message of the files and prints what is lost.
+/// Reads every message of the files and prints what is lost. A file that cannot be opened does not end the check of the others.
 fn check(files: &[PathBuf]) -> Result<(), Failure> {
-    let mut incomplete = 0;
+    let (mut incomplete, mut unopened, mut recoverable) = (0, 0, false);
     for file in files {
-        incomplete += usize::from(!check_file(file)?);
+        match check_file(file) {
+            Ok(CheckedFile::Whole) => {}
+            Ok(CheckedFile::Incomplete { is_recoverable }) => {
+                incomplete += 1;
+                recoverable |= is_recoverable;
+            }
+            Err(failure) if files.len() == 1 => return Err(failure),
+            Err(failure) => {
+                failure.print();
+                incomplete += 1;
+                unopened += 1;
+            }
+        }
     }
-    match incomplete {
-        0 => Ok(()),
-        count => Err(anyhow!(
-            "not whole: {count} of {}; quadfrog recover FILE keeps what can be read",
-            counted(files.len(), "file")
-        )
-        .into()),
+    if incomplete == 0 {
+        return Ok(());
     }
+    let remedy = if recoverable { "; quadfrog recover FILE keeps what can be read" } else { "" };
+    let text = format!("not whole: {incomplete} of {}{remedy}", counted(files.len(), "file"));
+    Err(if unopened == files.len() { Failure::Input(text) } else { Failure::Other(anyhow!(text)) })
 }
 
 /// Whether a session that runs in its folder still writes a recording: the newest there. An older unfinished one is what a
@@ -186,14 +210,25 @@ fn lost_in_words(player: &Player) -> String {
     let after =
         format!("what followed {:.3} s, and nothing tells how much that was", player.duration_ns() as f64 / 1e9);
     match (player.lacks_data_at_its_end(), player.lost_ns()) {
+        (false, 0) => "no chunk is lost".to_owned(),
         (false, _) => format!("{within:.3} s lost"),
         (true, 0) => format!("lost: {after}"),
         (true, _) => format!("lost: {within:.3} s, and {after}"),
     }
 }
 
-/// Returns whether a file is whole, or as whole as the session that still writes it has made it.
-fn check_file(file: &Path) -> Result<bool, Failure> {
+/// Result of the check of a file that can be opened.
+enum CheckedFile {
+    /// Nothing is missing but what the session that still writes it has not written yet.
+    Whole,
+    Incomplete {
+        /// Whether `quadfrog recover` makes it whole.
+        is_recoverable: bool,
+    },
+}
+
+/// Reads every message of a file and prints what is lost.
+fn check_file(file: &Path) -> Result<CheckedFile, Failure> {
     let written = is_written(file);
     let mut player = Player::open(file)?;
     let (mut ticks, mut records) = (0_u64, 0_u64);
@@ -221,7 +256,7 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
     }
     if written && extras.is_empty() && lacks_its_end_alone(&player) {
         put_line!("  a session still writes it");
-        return Ok(true);
+        return Ok(CheckedFile::Whole);
     }
     let damage = player.damage();
     for line in damage.iter().chain(&extras) {
@@ -236,5 +271,6 @@ fn check_file(file: &Path) -> Result<bool, Failure> {
             (false, _) => lost_in_words(&player),
         }
     );
-    Ok(whole)
+    let is_recoverable = !extras.is_empty() || damage.as_deref().is_some_and(is_recoverable);
+    Ok(if whole { CheckedFile::Whole } else { CheckedFile::Incomplete { is_recoverable } })
 }
