@@ -278,6 +278,26 @@ fn the_check_of_a_file_that_was_cut_off_says_from_when_on_it_is_lost() {
     assert!(!printed.contains("0.000 s lost"), "{printed}");
 }
 
+/// Regression: the check ended at the first file that could not be opened.
+#[test]
+fn a_check_goes_on_after_a_file_that_cannot_be_opened() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--record", "all"]);
+    let study = program.study("recordings");
+    fs::rename(study.join("session.mcap"), study.join("session-2.mcap")).unwrap();
+    fs::write(study.join("session.mcap"), "no recording").unwrap();
+    let output = program.run(&["replay", "--check", study.to_str().unwrap()]);
+    let [printed, message] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_shows(&printed, &["session-2.mcap", "whole"]);
+    assert_shows(&message, &["session.mcap: not an MCAP file", "not whole: 1 of 2 files"]);
+    assert!(!message.contains("quadfrog recover"), "{message}");
+    // Of files none of which can be opened nothing was checked.
+    fs::write(study.join("session-2.mcap"), "no recording").unwrap();
+    let message = program.refused(&["replay", "--check", study.to_str().unwrap()]);
+    assert_shows(&message, &["session-2.mcap: not an MCAP file", "not whole: 2 of 2 files"]);
+}
+
 #[test]
 fn a_recovery_that_does_not_fit_names_its_cause_and_leaves_nothing() {
     let program = Program::new();

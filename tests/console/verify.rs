@@ -145,6 +145,15 @@ fn a_file_that_cannot_be_verified_is_refused_with_the_reason() {
     assert_eq!(status, Some(2), "{error}");
     assert_shows(&error, &["robot.mcap", "recorded on a robot"]);
 
+    // Regression: of a file that was only read it said that it could not be written.
+    let mut bytes = std::fs::read(&file).unwrap();
+    let at = bytes.windows(12).position(|bytes| bytes == b"control.toml").expect("an attachment");
+    bytes[at + 100] ^= 1;
+    std::fs::write(program.path("flipped.mcap"), bytes).unwrap();
+    let (status, _, error) = verified(&program, &program.path("flipped.mcap"));
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["flipped.mcap: could not read: Attachment CRC failed"]);
+
     program.write("noise.mcap", "this is no recording");
     assert_eq!(verified(&program, &program.path("noise.mcap")).0, Some(2));
     assert_eq!(verified(&program, &program.path("nothing.mcap")).0, Some(2));

@@ -8,7 +8,7 @@ use crate::{notice, output};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCandidates;
-use quadfrog::recording::player::Player;
+use quadfrog::recording::player::{Player, is_recoverable};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
@@ -157,7 +157,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     }
     let damage = |player: &&Player| {
         let way = format!("`quadfrog recover {}` keeps what can be read", player.path().display());
-        player.damage().map(|damage| format!("{damage}; {way}"))
+        player.damage().map(|damage| if is_recoverable(&damage) { format!("{damage}; {way}") } else { damage })
     };
     match others.iter().filter_map(damage).collect::<Vec<_>>() {
         damage if damage.is_empty() => Ok(()),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EngineError, running_session};
-use quadfrog::recording::player::Player;
+use quadfrog::recording::player::{Player, is_recoverable};
 use quadfrog::recording::{RecordingError, recover};
 use quadfrog::trial::counted;
 
@@ -31,8 +31,8 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
         return Err(Failure::input(text));
     }
     let is_unfinished = file.extension().is_some_and(|extension| extension == "part");
-    if !is_unfinished && is_whole(file) {
-        return Err(Failure::input(format!("{}: it is whole; there is nothing to recover", file.display())));
+    if !is_unfinished {
+        refuse_nothing_to_recover(file)?;
     }
     let recovered = match output {
         Some(output) => recover::recover_to(file, output),
@@ -65,11 +65,21 @@ pub fn run(arguments: &RecoverArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether every message, attachment and index of a finished recording can be read.
-fn is_whole(file: &Path) -> bool {
-    let Ok(mut player) = Player::open(file) else { return false };
+/// Refuses a finished recording of which every chunk, attachment and index can be read.
+fn refuse_nothing_to_recover(file: &Path) -> Result<(), Failure> {
+    // What cannot be opened is refused with its reason below.
+    let Ok(mut player) = Player::open(file) else { return Ok(()) };
     player.by_ref().for_each(drop);
-    player.check_extras().is_ok_and(|damaged| damaged.is_empty()) && player.damage().is_none()
+    if !player.check_extras().is_ok_and(|damaged| damaged.is_empty()) {
+        return Ok(());
+    }
+    match player.damage() {
+        None => Err(Failure::input(format!("{}: it is whole; there is nothing to recover", file.display()))),
+        Some(damage) if is_recoverable(&damage) => Ok(()),
+        Some(damage) => {
+            Err(Failure::input(format!("{damage}; there is nothing to recover: messages are copied as they are")))
+        }
+    }
 }
 
 /// Refuses a recording that a session still writes: the session needs the name of the finished file.
