@@ -116,7 +116,7 @@ fn messages_of_one_time_are_read_ahead_up_to_a_number() {
     assert!(memory < 400 * MB, "{memory} bytes");
 }
 
-/// What is read too late for its time is reported in place of being played.
+/// A message that is read too late for its time is reported and not played.
 #[test]
 fn a_message_that_would_come_after_later_ones_is_left_out_and_reported() {
     let end = 5 * SECOND_NS;

@@ -4,8 +4,7 @@ use foxglove::messages::JointStates;
 use prost::Message;
 
 use super::Player;
-use super::events::MOST_EVENTS;
-use super::lost::{DamagedChunk, LostPart};
+use super::lost::{DamagedChunk, LostPart, MOST_EVENTS};
 use crate::recording::chunk::ChunkRecords;
 use crate::recording::container::Chunk;
 use crate::recording::error::RecordingError;

@@ -4,18 +4,15 @@ use std::collections::BTreeSet;
 
 use prost::Message;
 
+use super::lost::{MOST_EVENTS, weight};
 use super::{Marker, MarkerKind, Player};
 use crate::recording::container::Chunk;
 use crate::recording::error::RecordingError;
 use crate::recording::event_index::IndexedEvent;
-use crate::recording::record::{Record, Stamped};
+use crate::recording::record::Stamped;
 use crate::recording::topic::Topic;
 use crate::recording::wire::DecodeError;
 use crate::recording::{frog, schema};
-
-/// Most events and markers of a file, and most messages that are read ahead; each tick of a fault counts. A session writes some 20
-/// events a trial.
-pub(super) const MOST_EVENTS: usize = 262_144;
 
 impl Player {
     /// Reads the events of chunks, and of the copies at the end of the file. Appends them and the markers with their log times;
@@ -120,14 +117,6 @@ impl Player {
         } else {
             RecordingError::NoSession { path }
         }
-    }
-}
-
-/// Returns the number of events as which a record counts: a tick of a fault takes as much memory as a record.
-pub(super) fn weight(record: &Record) -> usize {
-    match record {
-        Record::FaultTicks(ticks) => ticks.len().max(1),
-        _ => 1,
     }
 }
 

@@ -1,8 +1,13 @@
-//! Parts of a recording that cannot be read.
+//! Parts of a recording that cannot be read, and the number of events beyond which others are left out.
 
 use std::collections::BTreeMap;
 
+use crate::recording::record::Record;
 use crate::recording::wire::DecodeError;
+
+/// Most events and markers of a file, and most messages that are read ahead; each tick of a fault counts. A session writes some 20
+/// events a trial.
+pub const MOST_EVENTS: usize = 262_144;
 
 /// A part of a recording that cannot be read.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,5 +57,13 @@ impl UnreadableMessages {
     pub fn count(&self) -> usize {
         let copies = self.counts.get(&0).copied().unwrap_or(0);
         (self.counts.values().sum::<usize>() - copies).max(copies)
+    }
+}
+
+/// Returns the number of events as which a record counts: a tick of a fault takes as much memory as a record.
+pub fn weight(record: &Record) -> usize {
+    match record {
+        Record::FaultTicks(ticks) => ticks.len().max(1),
+        _ => 1,
     }
 }

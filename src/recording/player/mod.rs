@@ -21,9 +21,8 @@ use super::wire::DecodeError;
 use crate::telemetry::Tick;
 
 pub use damage::is_recoverable;
-use events::{MOST_EVENTS, weight};
 pub use lost::LostPart;
-use lost::{DamagedChunk, UnreadableMessages};
+use lost::{DamagedChunk, MOST_EVENTS, UnreadableMessages, weight};
 use tick_joiner::TickJoiner;
 
 /// Most ticks of one rollout that a reader keeps, 2.4 kB each: 1,000 s. The longest `duration_s` is 600 s, countdown and settling
