@@ -11,7 +11,7 @@ use crate::control::estimator::Estimator;
 use crate::control::leg;
 use crate::control::settings::ControlSettings;
 use crate::recording::RecordingError;
-use crate::recording::player::{MOST_TICKS_OF_A_ROLLOUT, Played};
+use crate::recording::player::{Damage, MOST_TICKS_OF_A_ROLLOUT, Played};
 use crate::recording::timeline::Timeline;
 use crate::robot::description::RobotDescription;
 use crate::session::rejudge::{Judgement, rejudge, row_of_repeat};
@@ -158,7 +158,7 @@ impl Rejudging {
     }
 
     /// Returns the damage of the files, as far as it is found.
-    pub fn damage(&self) -> Vec<String> {
+    pub fn damage(&self) -> Vec<Damage> {
         self.recording.damage()
     }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
-use super::player::{LostPart, Marker, MarkerKind, Played, Player};
+use super::player::{Damage, LostPart, Marker, MarkerKind, Played, Player};
 use super::record::{Record, SessionInfo, StageRecord, Stamped};
 use super::session_files::recordings_in;
 use crate::telemetry::Mode;
@@ -299,8 +299,8 @@ impl Timeline {
             .take_while(move |event| event.time_ns < time_ns)
     }
 
-    /// Returns a description of the missing parts of each file, as far as they are found.
-    pub fn damage(&self) -> Vec<String> {
+    /// Returns the missing parts of each file, as far as they are found.
+    pub fn damage(&self) -> Vec<Damage> {
         self.parts.iter().filter_map(|part| part.player.damage()).collect()
     }
 

@@ -111,7 +111,7 @@ impl Recordings {
         }
         let lost_before = player.lost_before_recovery();
         self.damages.extend(lost_before.into_iter().map(|lost| format!("{}: {lost}", player.path().display())));
-        self.damages.extend(player.damage());
+        self.damages.extend(player.damage().map(|damage| damage.to_string()));
     }
 
     /// Takes over the ticks of a rollout; `is_ended`: the recording goes on after them or reports the trial's end.

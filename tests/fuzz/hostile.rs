@@ -68,7 +68,7 @@ fn played(bytes: &[u8], each: impl FnMut(Played)) -> (String, usize) {
     count_alloc::most_memory(|| {
         let mut player = Player::open(&path).unwrap();
         player.by_ref().for_each(each);
-        player.damage().unwrap()
+        player.damage().unwrap().to_string()
     })
 }
 

@@ -195,7 +195,9 @@ fn a_recording_of_a_session_that_runs_can_be_played() {
     while Player::open(&part).unwrap().count() < 501 {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
-    assert!(Player::open(&part).unwrap().damage().is_some_and(|damage| damage.contains("its end was not written")));
+    assert!(
+        Player::open(&part).unwrap().damage().is_some_and(|damage| damage.parts.contains("its end was not written"))
+    );
     assert!(!handle.is_finished());
     assert_eq!(handle.status().error, None);
     drop((ring, sender));

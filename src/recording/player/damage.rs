@@ -1,5 +1,8 @@
 //! Damage of a recording: chunks that cannot be read, and the time that they take.
 
+use std::fmt;
+use std::path::PathBuf;
+
 use foxglove::messages::JointStates;
 use prost::Message;
 
@@ -20,30 +23,42 @@ const TICK_NS: u64 = 1_000_000;
 /// Longest time between the messages of a chunk, and between chunks, that needs no proof, ns: a session flushes every second.
 const USUAL_SPAN_NS: u64 = 60_000_000_000;
 
-/// Ends of the descriptions of messages that cannot be read and of events that are left out.
-const NEWER_VERSION: &str = "perhaps of a newer version";
-const NOT_OURS: &str = "damaged, or not written by quadfrog";
+/// The missing parts of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Damage {
+    /// The recording.
+    pub path: PathBuf,
+    /// Their description.
+    pub parts: String,
+    /// Whether `quadfrog recover` helps: against damaged chunks and a missing end. Messages it copies as they are.
+    pub is_recoverable: bool,
+}
 
-/// Returns whether `quadfrog recover` helps against a damage as [`Player::damage`] describes it: against damaged chunks and a missing
-/// end. It copies messages as they are.
-pub fn is_recoverable(damage: &str) -> bool {
-    !damage.ends_with(NEWER_VERSION) && !damage.ends_with(NOT_OURS)
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path.display(), self.parts)
+    }
 }
 
 impl Player {
-    /// Returns a description of the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
+    /// Returns the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
     /// checksum when it is played. None for an intact file.
-    pub fn damage(&self) -> Option<String> {
+    pub fn damage(&self) -> Option<Damage> {
         let seconds = |log_time: u64| log_time.saturating_sub(self.start_utc_ns) as f64 / 1e9;
         let unreadable = self.unreadable.first.as_ref().map(|(log_time, error)| {
             let count = self.unreadable.count();
             let first = if count > 1 { "the first " } else { "" };
             let messages = counted(count, "message");
-            format!("{messages} cannot be read, {first}at {:.3} s: {error}; {NEWER_VERSION}", seconds(*log_time))
+            format!(
+                "{messages} cannot be read, {first}at {:.3} s: {error}; perhaps of a newer version",
+                seconds(*log_time)
+            )
         });
         let left_out = self.left_out_from.map(|log_time| {
             let from_s = seconds(log_time);
-            format!("holds more than {MOST_EVENTS} events; those after {from_s:.3} s are left out: {NOT_OURS}")
+            format!(
+                "holds more than {MOST_EVENTS} events; those after {from_s:.3} s are left out: damaged, or not written by quadfrog"
+            )
         });
         let chunks = self.damaged.first().map(|first| {
             format!(
@@ -58,10 +73,11 @@ impl Player {
             let count = counted(self.unguarded.len(), "chunk");
             format!("{count} without a checksum played as decoded; a wrong number there is not seen")
         });
-        // What can be recovered comes last: see `is_recoverable`.
-        let parts = [&unreadable, &left_out, &self.container.cut, &chunks, &unguarded];
+        let cut = &self.container.cut;
+        let is_recoverable = cut.is_some() || chunks.is_some() || unguarded.is_some();
+        let parts = [&unreadable, &left_out, cut, &chunks, &unguarded];
         let parts: Vec<&str> = parts.into_iter().flatten().map(String::as_str).collect();
-        (!parts.is_empty()).then(|| format!("{}: {}", self.path.display(), parts.join("; ")))
+        (!parts.is_empty()).then(|| Damage { path: self.path.clone(), parts: parts.join("; "), is_recoverable })
     }
 
     /// Verifies what playing does not read: attachments, metadata, index and the checksum of all data. Returns what is damaged.

@@ -20,7 +20,7 @@ use super::topic::Topic;
 use super::wire::DecodeError;
 use crate::telemetry::Tick;
 
-pub use damage::is_recoverable;
+pub use damage::Damage;
 pub use lost::LostPart;
 use lost::{DamagedChunk, MOST_EVENTS, UnreadableMessages, weight};
 use tick_joiner::TickJoiner;

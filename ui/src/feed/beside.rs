@@ -2,7 +2,7 @@
 
 use quadfrog::realtime::channel::SHOWN_EVERY;
 use quadfrog::recording::RecordingError;
-use quadfrog::recording::player::Played;
+use quadfrog::recording::player::{Damage, Played};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::Tick;
 
@@ -45,7 +45,7 @@ impl TrialPair {
     }
 
     /// Damage of the second recording, as far as it is found.
-    pub fn damage(&self) -> Vec<String> {
+    pub fn damage(&self) -> Vec<Damage> {
         self.second.as_ref().map_or(Vec::new(), Timeline::damage)
     }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use quadfrog::engine::Observer;
 use quadfrog::realtime::channel::{SHOWN_EVERY, StopLatch};
-use quadfrog::recording::player::{Marker, MarkerKind, Played};
+use quadfrog::recording::player::{Damage, Marker, MarkerKind, Played};
 use quadfrog::recording::record::{LogLevel, LogRecord, Record, Stamped};
 use quadfrog::recording::timeline::{Timeline, TrialRun};
 use quadfrog::telemetry::{Phase, Snapshot};
@@ -37,7 +37,7 @@ const FLUSH_NS: u64 = 1_000_000_000;
 const MOST_BEHIND_NS: u64 = 2 * FLUSH_NS;
 
 /// Descriptions of the damage found so far, file by file; they outlive the feed.
-pub type DamageWatch = Arc<Mutex<Vec<String>>>;
+pub type DamageWatch = Arc<Mutex<Vec<Damage>>>;
 
 pub struct ReplayFeed {
     recording: Timeline,

@@ -8,7 +8,7 @@ use crate::{notice, output};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCandidates;
-use quadfrog::recording::player::{Player, is_recoverable};
+use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
@@ -156,8 +156,8 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         notice!("{}: a session still writes it; it is exported up to {end_s:.3} s", player.path().display());
     }
     let damage = |player: &&Player| {
-        let way = format!("`quadfrog recover {}` keeps what can be read", player.path().display());
-        player.damage().map(|damage| if is_recoverable(&damage) { format!("{damage}; {way}") } else { damage })
+        let way = format!("; `quadfrog recover {}` keeps what can be read", player.path().display());
+        player.damage().map(|damage| format!("{damage}{}", if damage.is_recoverable { &way } else { "" }))
     };
     match others.iter().filter_map(damage).collect::<Vec<_>>() {
         damage if damage.is_empty() => Ok(()),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::put_line;
 use clap::Args;
 use quadfrog::engine::{EngineError, running_session};
-use quadfrog::recording::player::{Player, is_recoverable};
+use quadfrog::recording::player::Player;
 use quadfrog::recording::{RecordingError, recover};
 use quadfrog::trial::counted;
 
@@ -75,7 +75,7 @@ fn refuse_nothing_to_recover(file: &Path) -> Result<(), Failure> {
     }
     match player.damage() {
         None => Err(Failure::input(format!("{}: it is whole; there is nothing to recover", file.display()))),
-        Some(damage) if is_recoverable(&damage) => Ok(()),
+        Some(damage) if damage.is_recoverable => Ok(()),
         Some(damage) => {
             Err(Failure::input(format!("{damage}; there is nothing to recover: messages are copied as they are")))
         }

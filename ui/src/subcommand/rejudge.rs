@@ -52,7 +52,7 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
         damage if damage.is_empty() => Ok(()),
         damage => Err(anyhow::anyhow!(
             "{}; a trial of which ticks are missing there is judged by what is left",
-            damage.join("\n")
+            damage.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
         )
         .into()),
     }

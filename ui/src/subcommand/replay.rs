@@ -13,7 +13,7 @@ use clap::Args;
 use quadfrog::config::Config;
 use quadfrog::engine::{Rejudging, VerifyError, attached_config, attached_robot, running_session};
 use quadfrog::recording::RecordingError;
-use quadfrog::recording::player::{Played, Player, is_recoverable};
+use quadfrog::recording::player::{Damage, Played, Player};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
 use quadfrog::robot::description::RobotDescription;
@@ -79,18 +79,17 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         files.extend(of_second);
     }
     // What a session still writes is not damaged by having no end.
-    let written: Vec<String> = files.iter().filter(|file| is_written(file)).map(|file| named_in(file)).collect();
+    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
     let mut cuts = recording.cuts();
     cuts.extend(second.iter().flat_map(Timeline::cuts));
-    cuts.retain(|cut| written.iter().any(|file| cut.starts_with(file)));
-    let damage_of = |mut damage: Vec<String>| {
-        damage.retain(|line| !cuts.contains(line));
+    let damage_of = |mut damage: Vec<Damage>| {
+        damage.retain(|damage| !(written.contains(&&damage.path) && cuts.contains(&damage.to_string())));
         damage
     };
-    let repair = |damage: Vec<String>| {
-        let is_of = |file: &Path, line: &String| line.starts_with(&named_in(file)) && is_recoverable(line);
-        let damaged = files.iter().filter(|file| damage.iter().any(|line| is_of(file, line)));
-        let commands: Vec<String> = damaged.map(|file| format!("quadfrog recover {}", file.display())).collect();
+    let repair = |damage: Vec<Damage>| {
+        let damaged = damage.iter().filter(|damage| damage.is_recoverable);
+        let commands: Vec<String> =
+            damaged.map(|damage| format!("quadfrog recover {}", damage.path.display())).collect();
         let remedy =
             if commands.is_empty() { String::new() } else { format!("\n{} repairs it", commands.join(" and ")) };
         let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
@@ -195,13 +194,7 @@ pub fn is_written(file: &Path) -> bool {
 
 /// Whether nothing is missing in a recording but its end.
 pub fn lacks_its_end_alone(player: &Player) -> bool {
-    let cut = player.cut().map(|cut| format!("{}{cut}", named_in(player.path())));
-    cut.is_some() && player.damage() == cut
-}
-
-/// Returns how a line about damage begins that is about `file`.
-fn named_in(file: &Path) -> String {
-    format!("{}: ", file.display())
+    player.damage().is_some_and(|damage| player.cut() == Some(&damage.parts))
 }
 
 /// Returns how much of a file is lost. Of an end that was cut off nothing tells how long it was.
@@ -259,7 +252,7 @@ fn check_file(file: &Path) -> Result<CheckedFile, Failure> {
         return Ok(CheckedFile::Whole);
     }
     let damage = player.damage();
-    for line in damage.iter().chain(&extras) {
+    for line in damage.iter().map(ToString::to_string).chain(extras.iter().cloned()) {
         put_line!("  {line}");
     }
     let whole = damage.is_none() && extras.is_empty();
@@ -271,6 +264,6 @@ fn check_file(file: &Path) -> Result<CheckedFile, Failure> {
             (false, _) => lost_in_words(&player),
         }
     );
-    let is_recoverable = !extras.is_empty() || damage.as_deref().is_some_and(is_recoverable);
+    let is_recoverable = !extras.is_empty() || damage.as_ref().is_some_and(|damage| damage.is_recoverable);
     Ok(if whole { CheckedFile::Whole } else { CheckedFile::Incomplete { is_recoverable } })
 }

@@ -120,7 +120,7 @@ fn read(files: &[PathBuf], robot: &RobotDescription) -> Recordings {
     let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
     let mut recordings = Recordings::read(files, robot);
     for player in written.into_iter().filter_map(|file| Player::open(file).ok()).filter(lacks_its_end_alone) {
-        let no_end = player.damage();
+        let no_end = player.damage().map(|damage| damage.to_string());
         for damage in recordings.damages.iter_mut().filter(|damage| no_end.as_ref() == Some(*damage)) {
             *damage = format!("{}: a session still writes it", player.path().display());
         }
