@@ -235,16 +235,19 @@ fn commands_of_other_programs_are_counted() {
     assert!(peer.counts()["sent"].as_u64().unwrap() > 100);
 }
 
-/// Regression: a second console was invisible to the first, because its damping has the bytes of the guard's.
+/// Regression: a second console was invisible to the first, and both to one that only observes, because their damping has the bytes of
+/// the guard's.
 #[test]
 fn two_consoles_that_damp_one_robot_count_each_other() {
     let domain = domain();
     let (mut first, _) = network(domain, 1).open(3.0).unwrap();
     let (mut second, _) = network(domain, 1).open(3.0).unwrap();
+    let (mut observer, _) = network(domain, 1).open(3.0).unwrap();
     let damping = Some(JointCommand::damping(3.0));
     let begun = Instant::now();
     loop {
-        let links = [&mut first, &mut second].map(|robot| tick(&mut **robot, 1, damping).1);
+        let links = [(&mut first, damping), (&mut second, damping), (&mut observer, None)];
+        let links = links.map(|(robot, command)| tick(&mut **robot, 1, command).1);
         if links.iter().all(|link| link.foreign_commands > 100) {
             return;
         }

@@ -18,7 +18,7 @@ const MILLISECOND_NS: u64 = 1_000_000;
 pub struct OwnWrites {
     /// Time of the last command; zero before the first.
     last_ns: AtomicU64,
-    /// Time at which the last silence ended; zero before the first.
+    /// Time at which the last silence after a command ended; zero before the first.
     silence_end_ns: AtomicU64,
 }
 
@@ -32,15 +32,16 @@ impl OwnWrites {
         self.last_ns.store(now_ns, Ordering::Release);
     }
 
-    /// Whether the guard may speak at `now_ns`, or its last commands may be taken: this program is silent, was so until a moment ago,
-    /// or never wrote.
+    /// Whether the guard may speak at `now_ns`, or its last commands may be taken: this program has fallen silent, or was silent until a
+    /// moment ago. A program that never wrote has a guard that never speaks.
     pub fn guard_may_speak(&self, now_ns: u64) -> bool {
         let last_ns = self.last_ns.load(Ordering::Acquire);
-        let since_silence_ns = now_ns.saturating_sub(self.silence_end_ns.load(Ordering::Relaxed));
-        is_silent(last_ns, now_ns) || since_silence_ns < AFTER_SILENCE_MS * MILLISECOND_NS
+        let silence_end_ns = self.silence_end_ns.load(Ordering::Relaxed);
+        let since_silence_ns = now_ns.saturating_sub(silence_end_ns);
+        is_silent(last_ns, now_ns) || silence_end_ns > 0 && since_silence_ns < AFTER_SILENCE_MS * MILLISECOND_NS
     }
 }
 
 fn is_silent(last_ns: u64, now_ns: u64) -> bool {
-    last_ns == 0 || now_ns.saturating_sub(last_ns) >= GUARD_SILENCE_MS * MILLISECOND_NS
+    last_ns > 0 && now_ns.saturating_sub(last_ns) >= GUARD_SILENCE_MS * MILLISECOND_NS
 }
