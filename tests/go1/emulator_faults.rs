@@ -28,7 +28,7 @@ fn every_fault_is_parsed_as_help_writes_it() {
         let error = format!("{} a b c", words[0]).parse::<EmulatorFault>().unwrap_err().to_string();
         assert_eq!(error, format!("write it as: {usage}"));
     }
-    assert_eq!(help.lines().count(), 31);
+    assert_eq!(help.lines().count(), 32);
     assert_eq!("hot fr_CALF 82".parse(), Ok(EmulatorFault::Hot { joint: 2, celsius: 82.0 }));
 }
 
