@@ -24,6 +24,21 @@ fn a_list_with_wrong_entries_names_the_entries_that_it_needs() {
     refuses("optimize.toml", bounds, &["optimize.toml:2", "`bounds.f0` must be a list of two numbers, not"]);
 }
 
+/// Regression: a warning that comes after its stop, and foot forces of which none is allowed, were valid.
+#[test]
+fn a_lower_limit_above_its_upper_one_is_refused() {
+    let late = "[watchdog]\noperator_warn_ms = 1000\noperator_silent_ms = 200\n";
+    refuses("safety.toml", late, &["operator_warn_ms", "must not be above watchdog.operator_silent_ms = 200"]);
+    let forces = "[ready]\nforce_share_min = 2.5\nforce_share_max = 2.0\n";
+    refuses("safety.toml", forces, &["force_share_min", "must not be above ready.force_share_max = 2"]);
+}
+
+/// Regression: pauses of more than 10 s between jumps were valid, and their trials ended with "no state from the robot".
+#[test]
+fn a_frequency_between_jumps_that_is_none_is_refused() {
+    refuses("safety.toml", "[parameters]\nf1 = [0.001, 3.0]\n", &["parameters.f1", "0.05 to 100 Hz"]);
+}
+
 /// Regression: a folder without a configuration file was taken for one, and the defaults were in force without a word.
 #[test]
 fn a_folder_without_a_configuration_file_is_refused() {

@@ -17,6 +17,7 @@ pub use checked::{Config, ConfigLayer};
 pub use files::{ConfirmFile, ControlFile, OptimizeFile, SafetyFile, WorkersFile};
 pub use new_files::write_new_files;
 pub use reference::{FileReference, KeyReference, SectionReference, range_of, reference};
+pub use rules::LEAST_F1_HZ;
 
 use std::path::PathBuf;
 

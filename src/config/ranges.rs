@@ -153,7 +153,9 @@ const SAFETY: &[Row] = &[
     (&["watchdog.ramp_error_rad", "ready.tilt_rad", "ready.stance_rad"], within!(0.01, 3.15, "rad")),
     (&["ready.*"], within!(0.01, 10, "of the weight")),
     (&["watchdog.*"], within!(1, 600000, "ms")),
-    (&["parameters.f0", "parameters.f1"], within!(0, 100, "Hz")),
+    (&["parameters.f0"], within!(0, 100, "Hz")),
+    // As f1_hz of jumps in a row: a longer pause is none of a jump.
+    (&["parameters.f1"], within!(0.05, 100, "Hz")),
     (&["parameters.*"], within!(0, 10000, "N")),
     (&["gains.*"], within!(0, 10000)),
     (&["*.*"], within!(1e-9, 1e6)),

@@ -16,7 +16,7 @@ const OPTIMIZE: &str = "optimize.toml";
 const PRIOR: &str = "prior.toml";
 
 /// Least frequency between jumps in a row, Hz: a pause of 10 s.
-const LEAST_F1_HZ: f64 = 0.05;
+pub const LEAST_F1_HZ: f64 = 0.05;
 
 impl Config {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
@@ -66,21 +66,24 @@ impl Config {
     }
 
     fn check_safety(&self) -> Result<(), ConfigError> {
-        let SafetyFile { fall, gate, failsafe, parameters, gains, .. } = &self.safety;
+        let SafetyFile { fall, gate, failsafe, parameters, gains, ready, .. } = &self.safety;
         if gate.damping_kd > gate.kd_max {
             let reason =
                 format!("must not be above gate.kd_max = {}, which would reduce the stop's damping", gate.kd_max);
             return Err(self.refuse(SAFETY, "gate.damping_kd", gate.damping_kd, reason));
         }
-        // A warning comes before the stop that it announces.
+        // A warning comes before the stop that it announces, a lower limit below its upper one.
         let [warn, gap, lost] =
             [failsafe.state_age_warn_ms, failsafe.state_age_ms, failsafe.link_lost_ms].map(f64::from);
+        let [quiet, silent] = [failsafe.operator_warn_ms, failsafe.operator_silent_ms].map(f64::from);
         for (key, value, stop, limit) in [
             ("watchdog.motor_warm_c", failsafe.motor_warm_c, "watchdog.motor_c", failsafe.motor_c),
             ("watchdog.delay_warn_ms", failsafe.delay_warn_ms, "watchdog.delay_hold_ms", failsafe.delay_hold_ms),
             ("watchdog.delay_hold_ms", failsafe.delay_hold_ms, "watchdog.delay_land_ms", failsafe.delay_land_ms),
             ("watchdog.state_age_ms", gap, "watchdog.link_lost_ms", lost),
             ("watchdog.state_age_warn_ms", warn, "watchdog.state_age_ms", gap),
+            ("watchdog.operator_warn_ms", quiet, "watchdog.operator_silent_ms", silent),
+            ("ready.force_share_min", ready.force_share_min, "ready.force_share_max", ready.force_share_max),
             ("watchdog.stance_tilt_rad", failsafe.stance_tilt_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
             ("fall.roll_rad", fall.roll_rad, "watchdog.tilt_rad", failsafe.tilt_rad),
             ("fall.pitch_rad", fall.pitch_rad, "watchdog.tilt_rad", failsafe.tilt_rad),

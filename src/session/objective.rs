@@ -248,16 +248,17 @@ pub fn trips_limit(end: &TrialEnd) -> bool {
 
 /// Whether the trial under review tripped a limit of the motion; to judge it void the operator gives a reason.
 pub fn tripped_limit(row: &TrialRecord) -> bool {
-    row.suggested == Some(Verdict::Fall) && row.cause.starts_with(LIMIT)
+    row.suggested == Some(Verdict::Fall) && row.cause_by_rule().starts_with(LIMIT)
 }
 
 /// Whether a trial ended at rest, with or without a bounce.
 pub fn ended_at_rest(row: &TrialRecord) -> bool {
-    row.cause == suggest(&TrialEnd::Settled).1 || row.cause.starts_with(BOUNCED)
+    let cause = row.cause_by_rule();
+    cause == suggest(&TrialEnd::Settled).1 || cause.starts_with(BOUNCED)
 }
 
 /// Whether the detection of a fall ended a trial.
 pub fn ended_by_fall(row: &TrialRecord) -> bool {
-    let other = ended_at_rest(row) || tripped_limit(row) || row.cause == suggest(&TrialEnd::NotQuiet).1;
+    let other = ended_at_rest(row) || tripped_limit(row) || row.cause_by_rule() == suggest(&TrialEnd::NotQuiet).1;
     row.suggested == Some(Verdict::Fall) && !other
 }

@@ -223,6 +223,8 @@ impl Robot for Simulator {
         let mut state = SimState { joint_position: placement.joint_position, ..SimState::default() };
         // Lowered until the first part touches: one iteration on level ground, a few on blocks.
         state.position_world.z = 2.0;
+        // Above ground that is higher than a metre.
+        state.position_world.z += (1.0 - self.terrain.clearance(&state.position_world)).max(0.0);
         for _ in 0..200 {
             self.set_state(&state);
             let gap = self.smallest_gap();

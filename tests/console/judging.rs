@@ -4,7 +4,7 @@ use crate::support::{Console, assert_shows, line_with, proposal, session, tick, 
 use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{FallCause, Mode, Phase, Snapshot, Tick, TransitionCause};
-use quadfrog::trial::{Backend, ExperimentStage, REMOVED, SKIPPED, TrialRecord, Verdict};
+use quadfrog::trial::{Backend, ExperimentStage, Proposal, REMOVED, SKIPPED, TrialRecord, Verdict};
 use quadfrog_console::message::{Effect, ExportedRows, Msg, ReplayStatus};
 use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::text;
@@ -556,6 +556,13 @@ fn the_question_before_quitting_says_what_becomes_of_the_robot_and_of_the_trial(
     assert_shows(&question(Mode::Jump, ExperimentStage::Running, simulator), &["Trial #0 is under way", lands]);
     let waits = "it has landed, is measured, and waits until the study is continued";
     assert_shows(&question(Mode::Settle, ExperimentStage::Running, hardware), &["Trial #0 is under way", waits]);
+    // Regression: of a trial of several jumps, too, which keeps none of its measurements.
+    let mut console = Console::ready();
+    console.record(Record::Proposal(Proposal { repeats: 3, ..proposal(0, 1) }));
+    console.stage(ExperimentStage::Running, 0);
+    console.mode(Mode::Settle);
+    console.press(&["q"]);
+    assert_shows(&console.screen(120, 40), &["this jump is done again when the study is continued"]);
 }
 
 /// Regression: after STOP the line left out the key that runs the point again, and `u undo` did not name its trial.

@@ -48,6 +48,11 @@ fn a_simulated_study_is_continued_on_hardware_by_the_flag_alone() {
         let most = low + 0.4 * (high - low);
         assert!(parameter.value <= most, "{} = {}: simulated trials do not widen it", parameter.name, parameter.value);
     }
+    // Regression: bounds beyond it were taken, and the sampler proposed a value outside of them.
+    let mut experiment = experiment;
+    let refusal = experiment.narrow_bounds("Fz", 300.0, 350.0).unwrap_err().to_string();
+    assert!(refusal.contains("Fz = 300 N is beyond the hop envelope, at present 230 N"), "{refusal}");
+    experiment.narrow_bounds("Fz", 200.0, 350.0).unwrap();
     drop(experiment);
     open(&hardware).expect("accepted before");
     // And back: what the simulator adds is of another machine again.

@@ -5,12 +5,14 @@ use quadfrog::control::foot_placement::SHORTEST_FLIGHT_S;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{CONTROL_PERIOD_S, ticks_in};
 use quadfrog::session::evaluation::evaluate;
-use quadfrog::session::objective::{SHORTEST_BOUNCE_S, measure, suggest, suggest_measured, value};
+use quadfrog::session::objective::{
+    SHORTEST_BOUNCE_S, ended_at_rest, ended_by_fall, measure, suggest, suggest_measured, tripped_limit, value,
+};
 use quadfrog::session::rejudge::Judgement;
 use quadfrog::session::rollout::Rollout;
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{Phase, Tick, TrialEnd, TrialSpec};
-use quadfrog::trial::{Backend, BounceRule, JumpParameters, MeasuredJump, ObjectiveRule, Task, Verdict};
+use quadfrog::trial::{Backend, BounceRule, JumpParameters, MeasuredJump, ObjectiveRule, Task, TrialRecord, Verdict};
 
 /// Ticks of a robot that moves forward at 1 m/s: (phase, feet down, duration in s) one after the other.
 fn ticks(parts: &[(Phase, bool, f64)]) -> Vec<Tick> {
@@ -159,6 +161,25 @@ fn an_older_record_without_the_new_values_still_reads() {
     let old: MeasuredJump = serde_json::from_str(text).unwrap();
     assert_eq!((old.dx_m, old.flights, old.measured_value, old.jumps.len()), (0.4, 0, None, 0));
     assert!((value(&rule(BounceRule::Zero), &old) - 0.4).abs() < 1e-12);
+}
+
+/// Regression: a trial whose verdict the operator had changed was judged again as one of another end, because his words stand before
+/// the rule's.
+#[test]
+fn words_of_the_operator_hide_no_end_of_a_trial() {
+    let row = |suggested, cause: &str| TrialRecord {
+        suggested: Some(suggested),
+        cause: cause.into(),
+        ..TrialRecord::default()
+    };
+    for words in ["", "by the operator: it slipped; ", "re-run by the operator; looked like fall: "] {
+        let with_words = |cause: &str| format!("{words}{cause}");
+        assert!(ended_at_rest(&row(Verdict::Accept, &with_words("landed and settled"))), "{words}");
+        let limited = row(Verdict::Fall, &with_words("limit: RR_hip at -1.171 rad exceeds -0.963 rad"));
+        assert!(tripped_limit(&limited) && !ended_by_fall(&limited), "{words}");
+        assert!(!ended_by_fall(&row(Verdict::Fall, &with_words("did not come to rest"))), "{words}");
+        assert!(ended_by_fall(&row(Verdict::Fall, &with_words("roll 1.20 rad exceeds 1.00 rad"))), "{words}");
+    }
 }
 
 /// Regression: a trial that the operator had re-run changed by being judged again, because his words stand before the reason.

@@ -791,6 +791,21 @@ fn a_point_queued_beside_a_rerun_runs_and_so_does_the_rerun() {
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "nothing comes twice");
 }
 
+/// Regression: with more trials the queue that is shown lacked the re-run.
+#[test]
+fn a_rerun_stays_in_the_queue_when_more_trials_are_given() {
+    let mut experiment = experiment(5);
+    run(&mut experiment, TrialEnd::Settled);
+    experiment.judge(Verdict::Void, true).unwrap();
+    experiment.take_records();
+    experiment.extend(2).unwrap();
+    let queue = experiment.take_records().into_iter().find_map(|record| match record {
+        Record::Search(search) => Some(search.queue),
+        _ => None,
+    });
+    assert_eq!(queue.unwrap().iter().map(|point| point.trial).collect::<Vec<_>>(), [1]);
+}
+
 /// Regression: the point came before the re-run, which had been queued earlier.
 #[test]
 fn a_rerun_keeps_its_place_before_a_point_that_is_queued_after_it() {

@@ -20,6 +20,19 @@ fn stand(config: &SimConfig, seed: u64) -> (Simulator, JointCommand) {
     (simulator, JointCommand::hold(&joint_position, 100.0, 3.0))
 }
 
+/// Regression: on ground of 2 m and more the robot was placed inside it.
+#[test]
+fn a_robot_is_placed_on_high_ground_and_not_inside_it() {
+    let mut config = config(TerrainKind::Steps);
+    config.terrain.steps.start_m = -3.0;
+    config.terrain.steps.rise_m = 0.2;
+    config.terrain.steps.run_m = 0.2;
+    config.terrain.steps.count = 12;
+    let (simulator, _) = stand(&config, 0);
+    let gap = simulator.smallest_gap();
+    assert!(gap.abs() < 1e-9 && simulator.state().position_world.z > 2.4, "{gap} m");
+}
+
 #[test]
 fn on_steps_the_front_feet_stand_higher() {
     let mut config = config(TerrainKind::Steps);

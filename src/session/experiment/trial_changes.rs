@@ -117,7 +117,7 @@ impl Experiment {
     /// Searches a parameter between `low` and `high` from now on. As in Optuna, it is then sampled by itself until no
     /// finished trial has other bounds; trials outside stay in the history. The configured bounds undo it.
     /// Refused when a trial is under way, there is no such parameter, the bounds are no range or wider than
-    /// `safety.toml` allows, or the parameter is fixed outside them.
+    /// `safety.toml` allows, all of them is beyond the hop envelope, or the parameter is fixed outside them.
     pub fn narrow_bounds(&mut self, name: &str, low: f64, high: f64) -> Result<(), RequestRefusal> {
         self.must_be_idle()?;
         let widest = named(&self.plan.widest, "parameter", name)?;
@@ -140,6 +140,8 @@ impl Experiment {
                 fixed.value
             ));
         }
+        // The weakest force of these bounds; beyond the envelope nothing of them could be jumped.
+        envelope::must_be_inside(&self.plan, self.hop_share, name, 0.0_f64.clamp(low, high))?;
         self.search.set_bounds(name, low, high, &self.plan);
         self.write_search()
     }
@@ -259,7 +261,7 @@ impl Experiment {
         self.plan.budget = budget;
         match self.state {
             ExperimentState::Finished => self.propose()?,
-            _ => self.publish_search(&self.study.fork()),
+            _ => self.publish_search(&self.study_with_verdict()?),
         }
         Ok(())
     }

@@ -123,8 +123,10 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
             false => "The simulation ends as the robot stands; a real robot would sit down first.",
         }));
     }
+    let one_of_several = model.session.proposal.as_ref().is_some_and(|proposal| proposal.repeats > 1);
     if let Some(trial) = model.session.trial_in(ExperimentStage::Running) {
         let follows = match model.mode() {
+            Mode::Settle if one_of_several => "this jump is done again when the study is continued",
             Mode::Settle => "it has landed, is measured, and waits until the study is continued (--resume)",
             Mode::Jump => "the robot lands first; it is void, and its parameters run again",
             _ => "it does not jump; it is void, and its parameters run again",
@@ -132,7 +134,6 @@ pub fn quit(model: &Model) -> Vec<Line<'static>> {
         lines.push(Line::from(format!("Trial #{trial} is under way: {follows}.")));
     } else if let Some(row) = model.session.under_review() {
         let by_hand = row.hand_value.is_some();
-        let one_of_several = model.session.proposal.as_ref().is_some_and(|proposal| proposal.repeats > 1);
         let follows = match row.suggested {
             Some(Verdict::Fall) if objective::tripped_limit(row) => "It counts as a fall, as suggested.",
             Some(Verdict::Void) if !by_hand => "It is void, as suggested, and its parameters run again.",

@@ -11,7 +11,7 @@ use crate::{notice, output};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use indicatif::{ProgressBar, ProgressStyle};
-use quadfrog::config::Config;
+use quadfrog::config::{Config, LEAST_F1_HZ};
 use quadfrog::engine::{EngineError, STUDY_FILE, newest_config, open_stored, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
@@ -94,8 +94,10 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let jump = JumpParameters::from_values(&point, control.f1_hz);
     let mut spec = TrialSpec { gains: control.gains().with(&gains).with(&point), ..control.trial(*task, jump) };
     if let Some(duration_s) = arguments.duration {
-        if jump.f1_hz <= 0.0 {
-            let message = "--duration: jumps in a row need f1, the frequency between impulses; give it in --point or control.toml";
+        if jump.f1_hz < LEAST_F1_HZ {
+            let message = format!(
+                "--duration: jumps in a row need f1, the frequency between impulses, of at least {LEAST_F1_HZ} Hz; give it in --point or control.toml"
+            );
             return Err(Failure::input(message));
         }
         spec.jumps = jump.within(duration_s);
