@@ -498,6 +498,16 @@ fn jumps_and_proposals_use_no_function_of_the_c_library() {
     assert_none(&violations, "Call the crate libm, or a function of `robot::rotation`.");
 }
 
+/// Regression: the report of a panic took the arguments by a function that panics at one that is not UTF-8, which ended the process at
+/// once: without damped motors, a restored terminal and the report.
+#[test]
+fn no_argument_of_the_program_is_taken_for_utf_8() {
+    let takes = |file: &PathBuf| fs::read_to_string(file).unwrap().contains("env::args()");
+    let sources = ["src", "ui/src"].into_iter().flat_map(|folder| files(&root().join(folder), "rs"));
+    let violations: Vec<String> = sources.filter(takes).map(|file| short(&file)).collect();
+    assert_none(&violations, "Take `std::env::args_os`.");
+}
+
 #[test]
 fn no_file_is_longer_than_500_lines() {
     let mut violations = Vec::new();

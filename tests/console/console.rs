@@ -23,6 +23,7 @@ mod command_line;
 mod configuration;
 mod connection;
 mod dialogs;
+mod emulate;
 mod evaluate;
 mod export;
 mod first_user;

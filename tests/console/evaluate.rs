@@ -170,6 +170,7 @@ fn wrong_input_is_refused_with_name_value_and_remedy() {
         (vec!["--point", "Fx=40"], vec!["f0 is missing"]),
         (vec!["--point", "f0=abc"], vec!["abc", "not a number"]),
         (vec!["--point", "f0=1.3", "--duration", "5"], vec!["--duration", "f1"]),
+        (vec!["--point", "f0=1.3,f0=1.5"], vec!["f0 is given twice"]),
         (vec!["--point", "best"], vec!["--point best", "--config"]),
         (vec!["--point", "f0=1.3", "--vmc", "maybe"], vec!["maybe", "on,off"]),
         (vec!["--point", "f0=1.3", "--friction", "99"], vec!["--friction 99", "0 to 10"]),
@@ -179,6 +180,14 @@ fn wrong_input_is_refused_with_name_value_and_remedy() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(parts.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
     }
+}
+
+/// Regression: a repeated seed or variant counted as a run of its own.
+#[test]
+fn a_repeated_seed_or_variant_is_one_run() {
+    let point = ["--point", "f0=1.5,Fx=40,Fz=200", "--json"];
+    let repeated = ["--seeds", "0,0-1", "--vmc", "on,on", "--friction", "0.6,0.6"];
+    assert_eq!(runs(&[&point[..], &repeated[..]].concat()).len(), 2);
 }
 
 /// Of the seeds that no value of the example was chosen on.

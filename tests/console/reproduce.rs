@@ -214,6 +214,30 @@ fn ctrl_c_ends_at_once_and_says_what_is_kept() {
     assert!(!folder.path().join("results.json").exists());
 }
 
+/// Regression: studies in which nothing stood were left out of the mean best, which then agreed with the paper's.
+#[test]
+fn studies_in_which_nothing_stood_count_in_the_mean_best() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut results: Value =
+        serde_json::from_str(&fs::read_to_string(root().join("docs/reproduced.json")).unwrap()).unwrap();
+    for study in results["studies"].as_array_mut().unwrap() {
+        let job = &study["job"];
+        let like = ["hardware-like", "hardware-like-estimate"].contains(&job["configuration"].as_str().unwrap());
+        if like && job["task"] == "forward" && job["seed"] != 2000 {
+            for trial in study["trials"].as_array_mut().unwrap() {
+                (trial["verdict"], trial["value"]) = ("fall".into(), 0.0.into());
+            }
+        }
+    }
+    let from = folder.path().join("fallen.json");
+    fs::write(&from, results.to_string()).unwrap();
+    let report = folder.path().join("report");
+    reproduce(&report, &["--from", from.to_str().unwrap()]);
+    let html = fs::read_to_string(report.join("report.html")).unwrap();
+    let row = html.split("<tr>").find(|row| row.contains("forward, 20 trials, hardware-like simulation")).unwrap();
+    assert!(row.contains("0.11 m (0.00 to 0.54)") && row.contains("does not agree"), "{row}");
+}
+
 #[test]
 fn unusable_input_is_refused_before_the_work_with_its_remedy() {
     let folder = tempfile::tempdir().unwrap();
@@ -229,6 +253,7 @@ fn unusable_input_is_refused_before_the_work_with_its_remedy() {
         (vec!["--output", &good, "--only", "divergence"], vec!["divergence", "convergence"]),
         (vec!["--output", &good, "--readme", &good], vec!["--readme", "README.md", "root of a checkout"]),
         (vec!["--output", &good, "--trials", "0"], vec!["--trials", "0"]),
+        (vec!["--output", &good, "--seed", "4294967295"], vec!["--seed", "4294966295"]),
     ] {
         let output = quadfrog(&[&["reproduce"], &arguments[..]].concat());
         let message = String::from_utf8_lossy(&output.stderr);

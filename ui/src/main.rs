@@ -48,7 +48,8 @@ fn refuse(error: &clap::Error) -> ExitCode {
 fn defect_report(panic: &str) -> String {
     let thread = std::thread::current();
     let (name, version) = (thread.name().unwrap_or("unnamed"), VERSION);
-    let command = std::env::args().collect::<Vec<_>>().join(" ");
+    // A panic in here, as by an argument that is not UTF-8, would end the process before the motors are damped.
+    let command = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ");
     format!(
         "\nquadfrog: a defect of the program, in thread `{name}`: {panic}\n\
          Nothing that was judged is lost; the study continues with --resume FOLDER.\n\

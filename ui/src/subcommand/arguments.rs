@@ -289,7 +289,7 @@ impl StudyArguments {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub Vec<u32>);
 
-/// Parses seeds: 7, 0-4 or 0,3,7.
+/// Parses seeds: 7, 0-4 or 0,3,7; each once.
 pub fn parse_seeds(text: &str) -> Result<Seeds, String> {
     let number = |text: &str| {
         text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a whole number from 0 to 4294967295"))
@@ -307,5 +307,7 @@ pub fn parse_seeds(text: &str) -> Result<Seeds, String> {
             None => seeds.push(number(part)?),
         }
     }
+    let mut known = std::collections::BTreeSet::new();
+    seeds.retain(|seed| known.insert(*seed));
     Ok(Seeds(seeds))
 }

@@ -122,8 +122,9 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
 
 /// Applies faults from standard input until its end.
 fn read_faults(handle: &EmulatorHandle) {
-    for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-        match line.trim() {
+    // A line that is not UTF-8 is no fault, and not the last line.
+    for line in std::io::stdin().lock().split(b'\n').map_while(Result::ok) {
+        match String::from_utf8_lossy(&line).trim() {
             "" => {}
             "help" => put!("{}", emulator::help()),
             line => match line.parse() {

@@ -1,7 +1,7 @@
 //! Files that commands write for their user: whole or not at all, and never over a file of another kind.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use anyhow::anyhow;
@@ -93,6 +93,15 @@ fn whole(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>)
     file.into_inner().map_err(io::IntoInnerError::into_error)
 }
 
-fn not_written(file: &Path, error: &io::Error) -> Failure {
+/// Writes a text, as [`write_whole`].
+///
+/// # Errors
+/// Those of the file system, with the name of the file.
+pub fn write_text(file: &Path, text: &str) -> Result<(), Failure> {
+    write_whole(file, |to| to.write_all(text.as_bytes())).map_err(|error| not_written(file, &error))
+}
+
+/// Returns the error of a file that cannot be written.
+pub fn not_written(file: &Path, error: &io::Error) -> Failure {
     Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()))
 }

@@ -105,7 +105,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     }
     let settings = config.settings(robot, *task, Backend::Simulator)?;
     let simulators = simulators(arguments, config)?;
-    let vmc = if arguments.vmc.is_empty() { vec![spec.vmc] } else { arguments.vmc.clone() };
+    let vmc = if arguments.vmc.is_empty() { vec![spec.vmc] } else { each_once(&arguments.vmc) };
     let mut runs = Vec::new();
     for vmc in vmc {
         for (simulator, (friction, _)) in simulators.iter().enumerate() {
@@ -198,7 +198,13 @@ fn simulators(arguments: &EvaluateArguments, config: &Config) -> Result<Vec<(Opt
         simulator.check().map_err(|error| Failure::input(format!("--friction {friction}: {error}")))?;
         Ok((Some(friction), simulator))
     };
-    arguments.friction.iter().map(with).collect()
+    each_once(&arguments.friction).iter().map(with).collect()
+}
+
+/// Returns the values without repetitions: a repeated one is no other run.
+fn each_once<T: Copy + PartialEq>(values: &[T]) -> Vec<T> {
+    let is_first = |&at: &usize| !values[..at].contains(&values[at]);
+    (0..values.len()).filter(is_first).map(|at| values[at]).collect()
 }
 
 /// A progress bar on standard error, on a terminal.
@@ -260,6 +266,9 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterVal
                     let message =
                         format!("--point: {name} = {number} is outside the limits {least} to {most} of safety.toml");
                     return Err(Failure::input(message));
+                }
+                if values.iter().any(|(given, _)| given == name) {
+                    return Err(Failure::input(format!("--point: {name} is given twice")));
                 }
                 values.push((name.to_owned(), number));
             }

@@ -23,6 +23,7 @@ use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
 use super::arguments::whole_number;
 use super::failure::Failure;
+use super::output_file::{not_written, write_text};
 pub use schedule::{minutes, seconds_left};
 
 /// Name of the results in the output folder.
@@ -43,7 +44,7 @@ pub struct ReproduceArguments {
     only: Vec<PaperExperiment>,
     /// First seed: studies have this one and the next four, runs those from 100 above on. The examples name and were chosen on
     /// others
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole_number(0_u32..=u32::MAX))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = whole_number(0_u32..=u32::MAX - 1000))]
     seed: u32,
     /// Most trials of a study
     #[arg(long, value_name = "N", value_parser = whole_number(1_u32..=u32::MAX))]
@@ -81,8 +82,10 @@ pub fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
             schedule::run_experiments(&experiments, size, arguments.quick, threads, &file)?
         }
     };
+    // Before the page: what took minutes is kept whatever comes of it.
+    results.write(&file).map_err(|error| not_written(&file, &error))?;
     let page = page::page(&results);
-    write(&results, &page, folder)?;
+    write(&page, folder)?;
     if let Some(checkout) = &arguments.readme {
         readme::renew(&results, checkout)?;
     }
@@ -97,17 +100,10 @@ fn chosen(only: &[PaperExperiment]) -> Vec<PaperExperiment> {
     all.iter().copied().filter(|experiment| only.is_empty() || only.contains(experiment)).collect()
 }
 
-fn write(results: &ReproduceResults, page: &Page, folder: &Path) -> Result<(), Failure> {
-    let failed = |path: &Path, error: std::io::Error| {
-        Failure::Other(anyhow::anyhow!("{}: cannot be written: {error}", path.display()))
-    };
-    let file = folder.join(RESULTS_FILE);
-    results.write(&file).map_err(|error| failed(&file, error))?;
-    let report = folder.join("report.html");
-    std::fs::write(&report, html::render(page)).map_err(|error| failed(&report, error))?;
+fn write(page: &Page, folder: &Path) -> Result<(), Failure> {
+    write_text(&folder.join("report.html"), &html::render(page))?;
     for figure in page.figures() {
-        let path = folder.join(format!("{}.svg", figure.name));
-        std::fs::write(&path, svg::draw(figure)).map_err(|error| failed(&path, error))?;
+        write_text(&folder.join(format!("{}.svg", figure.name)), &svg::draw(figure))?;
     }
     Ok(())
 }

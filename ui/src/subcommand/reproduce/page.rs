@@ -17,8 +17,9 @@ pub fn page(results: &ReproduceResults) -> Page {
     let seeds = format!(
         "studies with seeds {} to {}, runs from seed {}",
         size.seed,
-        size.seed + size.studies - 1,
-        size.seed + 100
+        // Results of a file may have any seed.
+        size.seed.saturating_add(size.studies.saturating_sub(1)),
+        size.seed.saturating_add(100)
     );
     let mut page = Page::new(
         "Quadruped-Frog reproduced in simulation",

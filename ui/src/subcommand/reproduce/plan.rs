@@ -120,7 +120,7 @@ pub struct StudyJob {
     pub sampler: SamplerKind,
     pub seed: u32,
     pub trials: u32,
-    /// Configuration of the study whose best of the first 20 trials is this study's first point.
+    /// Configuration of the study whose best of the first `side_trials` trials is this study's first point.
     pub warm: Option<ExperimentConfiguration>,
 }
 
@@ -141,7 +141,7 @@ pub enum RunPoint {
     FirstWithF1(f64),
     /// These values.
     Given(ParameterValues),
-    /// The best of the first 20 trials of the study with this configuration and seed.
+    /// The best of the first `side_trials` trials of the study with this configuration and seed.
     BestOf(ExperimentConfiguration, u32),
 }
 

@@ -1,6 +1,6 @@
 //! The table and figures of README.md and the comparison in docs/paper.md, made from results.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use quadfrog::report::figure::Figure;
 use quadfrog::report::svg;
@@ -11,6 +11,7 @@ use super::page::size_text;
 use super::plan::PaperExperiment;
 use super::results::ReproduceResults;
 use crate::subcommand::failure::Failure;
+use crate::subcommand::output_file::{not_written, write_text};
 
 /// The results in a checkout from which table and figures are made.
 const REDUCED_FILE: &str = "docs/reproduced.json";
@@ -50,16 +51,14 @@ pub fn renew(results: &ReproduceResults, checkout: &Path) -> Result<(), Failure>
         let path = checkout.join(name);
         let (before, after) = parts(&path)?;
         let size = size_text(&reduced);
-        write(
-            path,
-            &format!("{before}{}\n\n{}\n{size}\n\n{}{after}", MARKERS[0], table(&reduced, &claims), MARKERS[1]),
-        )?;
+        let table = table(&reduced, &claims);
+        write_text(&path, &format!("{before}{}\n\n{table}\n{size}\n\n{}{after}", MARKERS[0], MARKERS[1]))?;
     }
     for figure in drawn(&reduced) {
-        write(checkout.join(format!("docs/{}.svg", figure.name)), &svg::draw(&figure))?;
+        write_text(&checkout.join(format!("docs/{}.svg", figure.name)), &svg::draw(&figure))?;
     }
     let path = checkout.join(REDUCED_FILE);
-    reduced.write(&path).map_err(|error| unwritten(&path, &error))
+    reduced.write(&path).map_err(|error| not_written(&path, &error))
 }
 
 /// Returns the text before and after the markers.
@@ -71,14 +70,6 @@ fn parts(path: &Path) -> Result<(String, String), Failure> {
     let (before, rest) = text.split_once(MARKERS[0]).ok_or_else(|| input(&"has no begin marker"))?;
     let (_, after) = rest.split_once(MARKERS[1]).ok_or_else(|| input(&"has no end marker"))?;
     Ok((before.to_owned(), after.to_owned()))
-}
-
-fn write(path: PathBuf, text: &str) -> Result<(), Failure> {
-    std::fs::write(&path, text).map_err(|error| unwritten(&path, &error))
-}
-
-fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Other(anyhow::anyhow!("{}: cannot be written: {error}", path.display()))
 }
 
 /// Returns the figures of README.md; that of the blocks only where there is a run to draw.

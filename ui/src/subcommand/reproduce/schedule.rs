@@ -37,7 +37,7 @@ pub fn run_experiments(
 ) -> Result<ReproduceResults, Failure> {
     let jobs = all_jobs(experiments, &size);
     let robot = RobotDescription::embedded("go1").map_err(Failure::input)?;
-    let workplace = Workplace::new(robot, &jobs)?;
+    let workplace = Workplace::new(robot, &jobs, size.side_trials)?;
     let kept = Arc::new(KeptResults {
         results: Mutex::new(ReproduceResults::new(size, quick)),
         asked: experiments.to_vec(),

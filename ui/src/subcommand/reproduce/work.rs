@@ -16,7 +16,7 @@ use quadfrog::telemetry::{Tick, TrialSpec};
 use quadfrog::trial::{Approval, Backend, JumpParameters, ParameterValues, Task};
 
 use super::configuration::ExperimentConfiguration;
-use super::plan::{PAPER_TRIALS, ReproduceJob, RunJob, RunPoint, StudyJob};
+use super::plan::{ReproduceJob, RunJob, RunPoint, StudyJob};
 use super::results::{RunResult, StudyResult, TrialResult, TrialTrace};
 use crate::subcommand::failure::Failure;
 
@@ -33,6 +33,8 @@ pub enum JobResult {
 pub struct Workplace {
     pub robot: RobotDescription,
     configurations: BTreeMap<ExperimentConfiguration, Config>,
+    /// Trials of a study whose best is used elsewhere: the study may be longer for another experiment.
+    side_trials: u32,
 }
 
 impl Workplace {
@@ -40,7 +42,7 @@ impl Workplace {
     ///
     /// # Errors
     /// When a configuration does not fit the defaults or the robot.
-    pub fn new(robot: RobotDescription, jobs: &[ReproduceJob]) -> Result<Workplace, Failure> {
+    pub fn new(robot: RobotDescription, jobs: &[ReproduceJob], side_trials: u32) -> Result<Workplace, Failure> {
         let mut configurations = BTreeMap::new();
         for job in jobs {
             let configuration = match job {
@@ -51,7 +53,7 @@ impl Workplace {
                 unknown.insert(configuration.load()?);
             }
         }
-        Ok(Workplace { robot, configurations })
+        Ok(Workplace { robot, configurations, side_trials })
     }
 
     /// Runs one job; `studies` has the complete studies, `progress` receives each trial's share of the work.
@@ -74,7 +76,7 @@ impl Workplace {
     fn study(&self, job: &StudyJob, studies: &[StudyResult], progress: impl Fn(u64)) -> Result<StudyResult, Failure> {
         let mut config = self.configurations[&job.configuration].clone();
         config.choose_sampler(job.sampler);
-        if let Some(point) = job.warm.and_then(|warm| best_of(studies, warm, job.task, job.seed)) {
+        if let Some(point) = job.warm.and_then(|warm| self.best_of(studies, warm, job.task, job.seed)) {
             config.optimize.first.insert(job.task.name().to_owned(), point.iter().cloned().collect());
         }
         let mut rollout = self.rollout(&config, job.task)?;
@@ -123,7 +125,7 @@ impl Workplace {
                 config.first(job.task).iter().map(with_f1).collect()
             }
             RunPoint::Given(values) => values.clone(),
-            RunPoint::BestOf(from, seed) => best_of(studies, *from, job.task, *seed).unwrap_or_default(),
+            RunPoint::BestOf(from, seed) => self.best_of(studies, *from, job.task, *seed).unwrap_or_default(),
         };
         let jump = JumpParameters::from_values(&point, control.f1_hz);
         let mut spec = TrialSpec { seed: u64::from(job.seed), ..control.trial(job.task, jump) };
@@ -178,26 +180,27 @@ impl Workplace {
             foot_z_m: std::array::from_fn(|leg| of(&|tick| tick.estimate.foot_position_leg[leg].z)),
         })
     }
+
+    /// Returns the best point of the first `side_trials` trials of a study with a cold start.
+    fn best_of(
+        &self,
+        studies: &[StudyResult],
+        configuration: ExperimentConfiguration,
+        task: Task,
+        seed: u32,
+    ) -> Option<ParameterValues> {
+        let fits = |job: &StudyJob| {
+            job.configuration == configuration
+                && job.task == task
+                && job.seed == seed
+                && job.sampler == SamplerKind::Tpe
+                && job.warm.is_none()
+        };
+        studies.iter().find(|study| fits(&study.job))?.best(self.side_trials).map(|best| best.params.clone())
+    }
 }
 
 /// Returns the value with four decimal places, below the width of a line in a figure.
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
-}
-
-/// Returns the best point of the first 20 trials of a study with a cold start.
-fn best_of(
-    studies: &[StudyResult],
-    configuration: ExperimentConfiguration,
-    task: Task,
-    seed: u32,
-) -> Option<ParameterValues> {
-    let fits = |job: &StudyJob| {
-        job.configuration == configuration
-            && job.task == task
-            && job.seed == seed
-            && job.sampler == SamplerKind::Tpe
-            && job.warm.is_none()
-    };
-    studies.iter().find(|study| fits(&study.job))?.best(PAPER_TRIALS).map(|best| best.params.clone())
 }

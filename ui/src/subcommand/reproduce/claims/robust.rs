@@ -4,6 +4,7 @@ use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::trial::Task;
 
 use super::claim::{ClaimJudgement, PaperClaim, claims_of, mean, spread};
+use super::jumps::bests;
 use crate::subcommand::reproduce::configuration::ExperimentConfiguration::{self, *};
 use crate::subcommand::reproduce::plan::{F1_HZ, PaperExperiment, RunPoint, THREE_TASKS};
 use crate::subcommand::reproduce::results::{ReproduceResults, RunResult};
@@ -186,8 +187,8 @@ pub fn rough_terrain(results: &ReproduceResults) -> Vec<PaperClaim> {
 
 pub fn transfer(results: &ReproduceResults) -> Vec<PaperClaim> {
     let trials = results.size.side_trials;
-    let ideal = |task| mean(results.bests(Ideal, task, trials).iter().filter_map(|best| best.value));
-    let cold = |task| mean(results.bests(HardwareLike, task, trials).iter().filter_map(|best| best.value));
+    let ideal = |task| mean(bests(results, Ideal, task, trials));
+    let cold = |task| mean(bests(results, HardwareLike, task, trials));
     // A fall counts with 0.
     let moved = |task| mean(results.transferred(task).iter().map(|run| run.value));
     let after = |task, warm, trials: u32| {
