@@ -23,11 +23,9 @@ impl JointRates {
             let reported = 0.5 * (last.joint_velocity_rad_s[joint] + now.joint_velocity_rad_s[joint]) * step.dt_s;
             let added = if step.is_short { moved - reported } else { 0.0 };
             self.error_rad[joint] = self.error_rad[joint] * kept(step.dt_s, SUM_S) + added;
-            let measured = |state: &RobotState| {
-                [state.joint_position_rad, state.joint_velocity_rad_s, state.joint_torque_n_m]
-                    .map(|values| values[joint])
-            };
-            let same = measured(last) == measured(now);
+            let same = moved == 0.0
+                && now.joint_velocity_rad_s[joint] == last.joint_velocity_rad_s[joint]
+                && now.joint_torque_n_m[joint] == last.joint_torque_n_m[joint];
             self.repeated[joint] = if same { self.repeated[joint].saturating_add(1) } else { 0 };
         }
     }

@@ -41,8 +41,8 @@ impl fmt::Display for Damage {
 }
 
 impl Player {
-    /// Returns the missing parts found so far: a truncated end is found on opening, a chunk with a wrong
-    /// checksum when it is played. None for an intact file.
+    /// Returns the missing parts found so far: a truncated end is found on opening, a chunk with a wrong checksum when it is played.
+    /// None for an intact file.
     pub fn damage(&self) -> Option<Damage> {
         let seconds = |log_time: u64| log_time.saturating_sub(self.start_utc_ns) as f64 / 1e9;
         let unreadable = self.unreadable.first.as_ref().map(|(log_time, error)| {

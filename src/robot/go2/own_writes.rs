@@ -1,4 +1,4 @@
-//! Times of this program's own commands, by which a command of its guard is told from the same bytes of another console.
+//! Times of this program's own commands. They tell a command of its guard from the same bytes of another console.
 //!
 //! Every console damps with the same bytes as its guard. The guard speaks only after this program was silent, so damping that arrives
 //! while it speaks is of another program.

@@ -289,6 +289,12 @@ impl StudyArguments {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub Vec<u32>);
 
+/// Returns the values without repetitions: a repeated one is no other run.
+pub fn each_once<T: Copy + PartialEq>(values: &[T]) -> Vec<T> {
+    let is_first = |&at: &usize| !values[..at].contains(&values[at]);
+    (0..values.len()).filter(is_first).map(|at| values[at]).collect()
+}
+
 /// Parses seeds: 7, 0-4 or 0,3,7; each once.
 pub fn parse_seeds(text: &str) -> Result<Seeds, String> {
     let number = |text: &str| {

@@ -22,7 +22,7 @@ use quadfrog::telemetry::TrialSpec;
 use quadfrog::trial::{Backend, JumpParameters, ParameterValues, Task, other_gains};
 use serde_json::json;
 
-use super::arguments::{self, Seeds, load_config_for, load_model, parse_seeds, whole_number};
+use super::arguments::{self, Seeds, each_once, load_config_for, load_model, parse_seeds, whole_number};
 use super::completion;
 use super::failure::Failure;
 use quadfrog::session::parallel::{cores, in_parallel};
@@ -199,12 +199,6 @@ fn simulators(arguments: &EvaluateArguments, config: &Config) -> Result<Vec<(Opt
         Ok((Some(friction), simulator))
     };
     each_once(&arguments.friction).iter().map(with).collect()
-}
-
-/// Returns the values without repetitions: a repeated one is no other run.
-fn each_once<T: Copy + PartialEq>(values: &[T]) -> Vec<T> {
-    let is_first = |&at: &usize| !values[..at].contains(&values[at]);
-    (0..values.len()).filter(is_first).map(|at| values[at]).collect()
 }
 
 /// A progress bar on standard error, on a terminal.

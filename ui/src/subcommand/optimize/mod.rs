@@ -3,8 +3,8 @@
 mod printer;
 mod recorder;
 
+use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,7 +26,7 @@ use quadfrog::trial::{Approval, Backend, Task, Verdict};
 use printer::Printer;
 use recorder::{RecordedRollout, StudyRecorder};
 
-use super::arguments::{self, Seeds, StudyArguments, parse_seeds, whole_number};
+use super::arguments::{self, Seeds, StudyArguments, each_once, parse_seeds, whole_number};
 use super::failure::Failure;
 use super::prior;
 use super::selection::{SelectedStudy, parse_storage, study_to_continue, study_to_join};
@@ -160,16 +160,14 @@ fn select(
         let seed = arguments.only_seed("--seed: a study that is continued has one seed")?;
         return Ok(vec![study_to_continue(folder, arguments.task.first().copied(), seed, robot)?]);
     }
-    let tasks = if arguments.task.is_empty() { &[Task::Forward][..] } else { &arguments.task };
+    let tasks = if arguments.task.is_empty() { vec![Task::Forward] } else { each_once(&arguments.task) };
     let seeds = arguments.seed.as_ref().map_or_else(|| vec![config.optimize.sampler.seed], |seeds| seeds.0.clone());
-    let mut pairs: Vec<(Task, u32)> = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed))).collect();
-    let mut seen = HashSet::new();
-    pairs.retain(|pair| seen.insert(*pair));
+    let pairs = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed)));
     let new = |(task, seed)| {
         let folder = arguments.study.new_folder(task, seed);
         SelectedStudy { task, seed, folder, new: true, budget: None }
     };
-    Ok(pairs.into_iter().map(new).collect())
+    Ok(pairs.map(new).collect())
 }
 
 /// Returns the prior of each task of the studies, if the sampler is `sim`. Made before the first study, once, on all cores;
