@@ -179,11 +179,23 @@ impl PriorMaker {
         Ok(ReadyPrior { model, from: Some(path.to_owned()), text: text.into() })
     }
 
-    /// Returns the prior of the first of `files` that has it, else simulates it on at most `jobs` threads. A file that is there
-    /// and is not this prior is reported to `notice`: nothing in it is lost, since a prior can be made again at any time.
+    /// Returns the prior of the first of `files` that has it. A file that is there and is not this prior is reported to `notice`:
+    /// nothing in it is lost, since a prior can be made again at any time.
+    pub fn find(&self, files: &[PathBuf], notice: &mut dyn FnMut(String)) -> Option<ReadyPrior> {
+        files.iter().find_map(|file| match self.read(file) {
+            Ok(prior) => Some(prior),
+            Err(PriorFileError::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => None,
+            Err(error) => {
+                notice(format!("{error}; it is made again"));
+                None
+            }
+        })
+    }
+
+    /// Returns the prior as [`PriorMaker::find`] or, where no file has it, as [`PriorMaker::make`].
     ///
     /// # Errors
-    /// When it cannot be simulated, or the sampler cannot use it, or `interrupt` was set.
+    /// Those of [`PriorMaker::make`].
     pub fn find_or_make(
         &self,
         files: &[PathBuf],
@@ -192,14 +204,10 @@ impl PriorMaker {
         interrupt: &AtomicBool,
         notice: &mut dyn FnMut(String),
     ) -> Result<ReadyPrior, EngineError> {
-        for file in files {
-            match self.read(file) {
-                Ok(prior) => return Ok(prior),
-                Err(PriorFileError::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {}
-                Err(error) => notice(format!("{error}; it is made again")),
-            }
+        match self.find(files, notice) {
+            Some(prior) => Ok(prior),
+            None => self.make(jobs, progress, interrupt),
         }
-        self.make(jobs, progress, interrupt)
     }
 
     /// Simulates the prior on at most `jobs` threads.

@@ -291,6 +291,8 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         (&["--seed", "4294967296"], "give a whole number from 0 to 4294967295"),
         (&["export", "--trial", "x", "session.mcap"], "for '--trial <N>': give a whole number from 0 to 4294967295"),
         (&["prior", "--jobs", "1.5"], "for '--jobs <N>': give a whole number from 1 to 65535"),
+        (&["evaluate", "--jobs", "-1"], "for '--jobs <N>': give a whole number from 1 to 65535"),
+        (&["bench", "loop", "--seconds", "-1"], "--seconds -1: give 0.1 to 86400"),
         (&["study", "list"], "recordings: there is no such folder; give a folder that holds studies"),
         (&["--observe", "--resume", "recordings"], "'--observe' cannot be used with '--resume <DIR>'"),
         (&["--observe", "--approve", "auto"], "'--observe' cannot be used with '--approve <WHAT>'"),
@@ -303,6 +305,33 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         program.write("notes.txt", "notes");
         assert_shows(&program.refused(arguments), &[wanted]);
     }
+}
+
+/// Regression: such a place was refused with status 1 and without a remedy, for a prior after the simulation of its robots.
+#[test]
+fn a_place_that_cannot_be_written_is_refused_before_the_work() {
+    let program = Program::new();
+    program.write("notes.txt", "notes");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let (urdf, sample) = (root.join("robots/go1/go1.urdf"), root.join("recordings/samples/forward"));
+    let (urdf, sample) = (urdf.to_str().unwrap(), sample.to_str().unwrap());
+    for (arguments, place) in [
+        (&["prior", "--output", "/proc/none/prior.json"][..], "/proc/none/prior.json"),
+        (&["optimize", "--trials", "1", "--sampler", "sim", "--output", "notes.txt/below"], "notes.txt/below/priors"),
+        (&["ask-tell", "--sampler", "sim", "--output", "notes.txt/below"], "notes.txt/below/priors"),
+        (&["config", "init", "notes.txt"], "notes.txt"),
+        (&["config", "schema", "--output", "notes.txt"], "notes.txt"),
+        (&["man", "notes.txt"], "notes.txt"),
+        (&["init", urdf, "notes.txt"], "notes.txt"),
+        (&["report", sample, "--figures", "notes.txt/below"], "notes.txt/below"),
+    ] {
+        let message = program.refused(arguments);
+        assert_shows(&message, &[place, "cannot be written: ", "; give another place"]);
+        assert!(!message.contains("the prior of"), "nothing was simulated: {message}");
+        assert_eq!(fs::read_to_string(program.path("notes.txt")).unwrap(), "notes");
+    }
+    let message = program.refused(&["screenshot", sample, "--output", "-"]);
+    assert_shows(&message, &["--output -: standard output is the default", "./-"]);
 }
 
 /// Regression: the operator of a user without a name, as in a container, was unknown without a word.

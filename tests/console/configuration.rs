@@ -31,7 +31,10 @@ fn every_value_is_shown_with_the_file_and_line_that_gives_it() {
     for file in FILES {
         assert!(all.lines().any(|line| line.starts_with(file) && line.ends_with("# built-in")), "{file}");
     }
-    assert_shows(&program.refused(&["config", "show", "flal"]), &["flal", "quadfrog config show"]);
+    for what in [&["flal"][..], &["safety.toml", "flal"]] {
+        let message = program.refused(&[&["config", "show"], what].concat());
+        assert_shows(&message, &["flal: no key of the configuration begins so", "quadfrog config show"]);
+    }
 }
 
 /// A robot's own configuration lies under the given one; whole files of the built-in values are reported to replace it.

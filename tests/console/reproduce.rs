@@ -200,16 +200,22 @@ fn tables_of_a_checkout_need_every_experiment_and_are_written_between_their_mark
 }
 
 #[test]
-fn ctrl_c_ends_at_once_and_says_what_is_kept() {
+fn a_signal_ends_at_once_and_says_what_is_kept() {
+    for signal in [Signal::SIGINT, Signal::SIGTERM] {
+        end_by(signal);
+    }
+}
+
+fn end_by(signal: Signal) {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(QUADFROG);
     command.args(["reproduce", "--only", "convergence", "--output"]).arg(folder.path());
     let mut child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
     assert!(lines.next().unwrap().unwrap().contains("30 studies"));
-    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
+    kill(Pid::from_raw(child.id() as i32), signal).unwrap();
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(child.wait().unwrap().code(), Some(128 + signal as i32));
     assert!(rest.concat().contains("interrupted: no experiment was complete, nothing was written"), "{rest:?}");
     assert!(!folder.path().join("results.json").exists());
 }

@@ -354,6 +354,34 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
 }
 
+/// Regression: after one of its verdicts was changed to a fall, the point of a confirmation still "leads with 97 % confidence".
+#[test]
+fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    (0..12).for_each(|_| jump(&mut experiment, 0.02));
+    experiment.confirm_best(60).unwrap();
+    let mut news = News::default();
+    told(&mut experiment, &mut news);
+    while news.search.as_ref().unwrap().confirming.is_some() {
+        jump(&mut experiment, 0.02);
+        told(&mut experiment, &mut news);
+    }
+    // One more jump, so that no verdict of the confirmation is the last one.
+    jump(&mut experiment, 0.02);
+    told(&mut experiment, &mut news);
+    let leader = news.points.iter().find(|point| point.confidence.is_some()).unwrap().clone();
+    assert!(leader.confidence.unwrap() >= 0.95);
+    experiment.change_verdict(leader.trials[1], Verdict::Fall, "it fell on the video").unwrap();
+    told(&mut experiment, &mut news);
+    let now = news.points.iter().find(|point| point.trials == leader.trials).unwrap();
+    assert_eq!(now.without_fall, leader.without_fall - 1);
+    assert!(now.confidence.is_none_or(|confidence| confidence < 0.95), "{now:?}");
+    experiment.close().unwrap();
+    let words = confirmation_in_words(&study_in(folder.path()), 0.5).expect("it is kept");
+    assert!(words.contains("the confidence is below the wanted one"), "{words}");
+}
+
 /// Regression: a simulator without noise gave "100.0 % confidence", because equal repeats have no spread.
 #[test]
 fn equal_repeats_give_no_confidence() {

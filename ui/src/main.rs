@@ -5,15 +5,15 @@
 
 use std::process::ExitCode;
 
+use clap::CommandFactory as _;
 use clap::error::ErrorKind;
-use clap::{CommandFactory as _, Parser};
 use quadfrog_console::output;
 use quadfrog_console::subcommand::{self, Arguments, Failure, VERSION};
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|info| output::message(&defect_report(&info.to_string()))));
     subcommand::answer_shell(Arguments::command);
-    let arguments = match Arguments::try_parse() {
+    let arguments = match Arguments::of_process() {
         Ok(arguments) => arguments,
         Err(error) => return refuse(&error),
     };

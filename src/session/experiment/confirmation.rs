@@ -101,19 +101,18 @@ impl BestConfirmation {
         let compared = compared(&running.trials, study);
         let unit = unit_of(study);
         let Some(first) = compared.first() else { return NextRepeat::None };
-        let over = |leader: usize, confidence: f64, sure: bool, message: String| {
-            let (trials, leader) = (running.trials.clone(), compared[leader].trials[0]);
-            NextRepeat::Over(Conclusion { trials, leader, confidence, sure }, message)
+        let lead = lead(&compared, direction);
+        let over = |sure: bool, message: String| {
+            let Lead { point, confidence } = lead;
+            let (trials, leader) = (running.trials.clone(), compared[point].trials[0]);
+            NextRepeat::Over(Conclusion { trials, leader, confidence, sure, wanted: Some(self.confidence) }, message)
         };
         if compared.len() < 2 {
             let message = format!("only the point of trial {} is left to compare: nothing to confirm", first.trials[0]);
-            return over(0, NO_CONFIDENCE, false, message);
+            return over(false, message);
         }
         match confirm(&compared, direction, self.confidence) {
-            Confirmation::Leads(leader, confidence) => {
-                let confidence = if varies(&compared) { confidence } else { NO_CONFIDENCE };
-                over(leader, confidence, true, format!("confirmed: {}", lead_text(&compared, leader, confidence, unit)))
-            }
+            Confirmation::Leads(..) => over(true, format!("confirmed: {}", lead_text(&compared, lead, unit))),
             Confirmation::Repeat(point) if running.left(study.trials()) > 0 => {
                 match study.trial(compared[point].trials[0]) {
                     Ok(first) => NextRepeat::Repeat(Box::new(first.clone())),
@@ -125,13 +124,12 @@ impl BestConfirmation {
                 NextRepeat::None
             }
             Confirmation::Repeat(_) => {
-                let rank = rank(&compared, direction);
-                let (confidence, short) = match repeated(&compared) {
-                    true => (rank.confidence, format!("short of {:.0} %", 100.0 * self.confidence)),
-                    false => (NO_CONFIDENCE, too_few_jumps()),
+                let short = match repeated(&compared) {
+                    true => format!("short of {:.0} %", 100.0 * self.confidence),
+                    false => too_few_jumps(),
                 };
-                let lead = lead_text(&compared, rank.leader, confidence, unit);
-                over(rank.leader, confidence, false, format!("the repeats are used up: {lead}; {short}"))
+                let lead = lead_text(&compared, lead, unit);
+                over(false, format!("the repeats are used up: {lead}; {short}"))
             }
         }
     }
@@ -148,25 +146,13 @@ impl BestConfirmation {
         let kept = StudyAttributes::of(study.attributes());
         let running = kept.confirm;
         let concluded = self.concluded.clone().or(kept.confirmed);
-        let trials = match (&running, &concluded) {
-            (Some(RunningConfirmation { trials, .. }), _) | (None, Some(Conclusion { trials, .. })) => {
-                trials.as_slice()
-            }
-            (None, None) => &[],
-        };
-        let leader = match (&concluded, &running) {
-            (Some(concluded), _) => {
-                let confidence = kept_confidence(concluded, &compared(&concluded.trials, study));
-                (confidence > NO_CONFIDENCE).then_some((concluded.leader, confidence))
-            }
-            (None, Some(running)) => {
-                let compared = compared(&running.trials, study);
-                (compared.len() > 1 && repeated(&compared) && varies(&compared))
-                    .then(|| rank(&compared, study.options().direction))
-                    .map(|rank| (compared[rank.leader].trials[0], rank.confidence))
-            }
-            (None, None) => None,
-        };
+        let trials = running.map(|running| running.trials).or(concluded.map(|concluded| concluded.trials));
+        let trials = trials.unwrap_or_default();
+        let compared = compared(&trials, study);
+        let lead = (!compared.is_empty()).then(|| lead(&compared, study.options().direction));
+        let leader = lead
+            .filter(|lead| lead.confidence > NO_CONFIDENCE)
+            .map(|lead| (compared[lead.point].trials[0], lead.confidence));
         let record = |point: RepeatedPoint| {
             let contender = trials.iter().any(|first| point.trials.contains(first));
             (point.repeats() > 1 || contender).then(|| PointRecord {
@@ -208,16 +194,22 @@ pub fn confirmation_in_words(study: &Study, confidence: f64) -> Option<String> {
         },
         None => kept.confirmed?,
     };
+    // The points as they are now: a verdict may have been changed, or one of them run again, since it was concluded.
     let points = compared(&concluded.trials, study);
-    let leader = points.iter().position(|point| point.trials.contains(&concluded.leader))?;
-    let short = match (concluded.sure, repeated(&points)) {
-        (true, _) => String::new(),
+    if points.is_empty() {
+        return None;
+    }
+    let lead = lead(&points, study.options().direction);
+    let short = match repeated(&points) {
         _ if points.len() < 2 => "; no other point was left to compare".to_owned(),
-        (false, true) => "; the confidence is below the wanted one".to_owned(),
-        (false, false) => format!("; {}", too_few_jumps()),
+        false => format!("; {}", too_few_jumps()),
+        true if varies(&points) && lead.confidence < concluded.wanted.unwrap_or(confidence) => {
+            "; the confidence is below the wanted one".to_owned()
+        }
+        true => String::new(),
     };
-    let lead = lead_text(&points, leader, kept_confidence(&concluded, &points), unit_of(study));
-    Some(lead + &short + &later_in_words(study, &points, leader))
+    let text = lead_text(&points, lead, unit_of(study));
+    Some(text + &short + &later_in_words(study, &points, lead.point))
 }
 
 /// Returns in words the best point that was first run after the last repeat, if it is better than the leading one.
@@ -300,14 +292,25 @@ fn varies(compared: &[RepeatedPoint]) -> bool {
     compared.iter().any(|point| point.values.windows(2).any(|pair| pair[0] != pair[1]))
 }
 
-/// The confidence of a conclusion: an earlier version kept one of 1 where the repeats are equal.
-fn kept_confidence(concluded: &Conclusion, compared: &[RepeatedPoint]) -> f64 {
-    if repeated(compared) && !varies(compared) { NO_CONFIDENCE } else { concluded.confidence }
+/// The leading one of some compared points.
+#[derive(Debug, Clone, Copy)]
+struct Lead {
+    /// Index of the point.
+    point: usize,
+    /// Confidence that it is the best; [`NO_CONFIDENCE`] where too few jumps say so, or equal ones.
+    confidence: f64,
+}
+
+/// Returns the leading one of at least one compared point.
+fn lead(compared: &[RepeatedPoint], direction: Direction) -> Lead {
+    let rank = rank(compared, direction);
+    let says = compared.len() > 1 && repeated(compared) && varies(compared);
+    Lead { point: rank.leader, confidence: if says { rank.confidence } else { NO_CONFIDENCE } }
 }
 
 /// The leading point in words.
-fn lead_text(compared: &[RepeatedPoint], leader: usize, confidence: f64, unit: String) -> String {
-    let point = &compared[leader];
+fn lead_text(compared: &[RepeatedPoint], Lead { point, confidence }: Lead, unit: String) -> String {
+    let point = &compared[point];
     let spread = point.deviation().map(|deviation| format!(" +- {deviation:.3}")).unwrap_or_default();
     let sure = match confidence > NO_CONFIDENCE {
         true => format!("with {:.1} % confidence", 100.0 * confidence),

@@ -81,6 +81,7 @@ pub struct RunningConfirmation {
     pub from: u32,
 }
 
+/// The end of a confirmation. Leader and confidence are those of that moment; what is shown is computed from the present trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conclusion {
     /// First trials of the compared points.
@@ -91,6 +92,8 @@ pub struct Conclusion {
     pub confidence: f64,
     /// Whether the confidence is enough.
     pub sure: bool,
+    /// Confidence that is enough; none in a study of an earlier version.
+    pub wanted: Option<f64>,
 }
 
 impl StudyAttributes {

@@ -125,7 +125,7 @@ pub fn user_folder() -> Option<PathBuf> {
 #[derive(Debug, Clone, Args)]
 pub struct StudyArguments {
     /// Budget: number of trials that count [default: from optimize.toml]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_number(1_u32..=u32::MAX))]
+    #[arg(long, value_name = "N", value_parser = whole_number(1_u32..=u32::MAX))]
     pub trials: Option<u32>,
     /// Folder whose TOML files replace those of the configuration, whole or key by key [default: ~/.config/quadfrog if it
     /// exists]

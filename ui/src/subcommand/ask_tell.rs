@@ -26,7 +26,7 @@ pub struct AskTellArguments {
     #[arg(long, value_name = "SAMPLER", value_parser = arguments::sampler())]
     sampler: Option<SamplerKind>,
     /// Seed of the sampler [default: from optimize.toml]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_number(0_u32..=u32::MAX))]
+    #[arg(long, value_name = "N", value_parser = whole_number(0_u32..=u32::MAX))]
     seed: Option<u32>,
     /// Folder whose TOML files replace those of the configuration, whole or key by key
     #[arg(long, value_name = "DIR")]

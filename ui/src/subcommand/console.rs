@@ -123,7 +123,7 @@ pub struct ConsoleArguments {
     #[arg(long, value_name = "TASK", value_parser = arguments::task())]
     task: Option<Task>,
     /// Seed of the study [default: from optimize.toml]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_number(0_u32..=u32::MAX))]
+    #[arg(long, value_name = "N", value_parser = whole_number(0_u32..=u32::MAX))]
     seed: Option<u32>,
     #[command(flatten)]
     study: StudyArguments,

@@ -1,5 +1,6 @@
 //! The error of a command and its exit status.
 
+use super::output_file::not_written;
 use crate::notice;
 use quadfrog::config::ConfigError;
 use quadfrog::engine::EngineError;
@@ -39,8 +40,8 @@ impl From<ConfigError> for Failure {
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Failure {
         match &error {
+            EngineError::Config(ConfigError::Write { path, source }) => not_written(path, source),
             EngineError::System { .. }
-            | EngineError::Config(ConfigError::Write { .. })
             | EngineError::Study(StudyError::Journal(
                 JournalError::Io { .. }
                 | JournalError::Redis { .. }

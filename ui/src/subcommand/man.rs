@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use crate::put_line;
-use anyhow::Context as _;
 use clap::{Args, Command};
 
 use super::failure::Failure;
+use super::output_file::not_written;
 
 #[derive(Debug, Args)]
 pub struct ManArguments {
@@ -22,7 +22,7 @@ pub fn run(arguments: &ManArguments, program: Command) -> Result<(), Failure> {
         std::fs::create_dir_all(folder)?;
         clap_mangen::generate_to(program, folder)
     };
-    write().with_context(|| format!("{}: the manual pages cannot be written", folder.display()))?;
+    write().map_err(|error| not_written(folder, &error))?;
     put_line!("manual pages written to {}", folder.display());
     Ok(())
 }

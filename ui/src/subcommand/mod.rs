@@ -31,7 +31,7 @@ mod study;
 mod table;
 mod verify;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{Arg, Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use crate::output;
 pub use arguments::VERSION;
@@ -105,6 +105,27 @@ enum Subcommands {
     Man(man::ManArguments),
     /// Report studies: tables on the terminal, one HTML file with figures, SVG files, JSON
     Report(report::ReportArguments),
+}
+
+impl Arguments {
+    /// Parses the command line of the process.
+    ///
+    /// # Errors
+    /// Unusable arguments; help or version, which are asked for.
+    pub fn of_process() -> Result<Arguments, clap::Error> {
+        let mut command = take_negative_numbers(Arguments::command());
+        let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+        Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+    }
+}
+
+/// Lets every option take a negative number: its own parser says what is asked for, where clap would call it an unknown option.
+fn take_negative_numbers(command: Command) -> Command {
+    let take = |arg: Arg| {
+        let takes = arg.get_action().takes_values() && !arg.is_positional();
+        arg.allow_negative_numbers(takes)
+    };
+    command.mut_args(take).mut_subcommands(take_negative_numbers)
 }
 
 /// Carries out a command line.

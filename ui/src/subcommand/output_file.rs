@@ -19,6 +19,11 @@ pub fn write_file(
     extension: &str,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Failure> {
+    if file.as_os_str() == "-" {
+        return Err(Failure::input(
+            "--output -: standard output is the default, leave --output out; a file of this name is ./-",
+        ));
+    }
     require_place("--output", file)?;
     // What does not exist, or leads nowhere, is written as it is named.
     let place = fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
@@ -101,7 +106,30 @@ pub fn write_text(file: &Path, text: &str) -> Result<(), Failure> {
     write_whole(file, |to| to.write_all(text.as_bytes())).map_err(|error| not_written(file, &error))
 }
 
-/// Returns the error of a file that cannot be written.
-pub fn not_written(file: &Path, error: &io::Error) -> Failure {
-    Failure::Other(anyhow!("{}: cannot be written: {error}", file.display()))
+/// Refuses a file in whose folder, made if it is missing, no file can be written: before work whose result it is to hold. `remedy`
+/// says what to give instead.
+pub fn require_writable(file: &Path, remedy: &str) -> Result<(), Failure> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let probe = file.with_file_name(format!(".{}.probe", std::process::id()));
+    fs::create_dir_all(folder)
+        .and_then(|()| File::create(&probe))
+        .and_then(|_| fs::remove_file(&probe))
+        .map_err(|error| Failure::input(format!("{}: cannot be written: {error}; {remedy}", file.display())))
+}
+
+/// Returns the error of a file or a folder that cannot be written. Where another place would do, it is one of the input.
+pub fn not_written(path: &Path, error: &io::Error) -> Failure {
+    let text = format!("{}: cannot be written: {error}", path.display());
+    match is_of_place(error.kind()) {
+        true => Failure::input(format!("{text}; give another place")),
+        false => Failure::Other(anyhow!(text)),
+    }
+}
+
+/// Whether an error of the file system is one of the named place, so that another would do.
+pub fn is_of_place(error: io::ErrorKind) -> bool {
+    use io::ErrorKind::{AlreadyExists, InvalidFilename, IsADirectory, NotADirectory, NotFound};
+    use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
+    matches!(error, AlreadyExists | InvalidFilename | IsADirectory | NotADirectory | NotFound)
+        || matches!(error, PermissionDenied | ReadOnlyFilesystem)
 }

@@ -22,6 +22,7 @@ use serde_json::json;
 use super::arguments::{self, whole_number};
 use super::completion;
 use super::failure::Failure;
+use super::output_file::require_writable;
 
 #[derive(Debug, Args)]
 pub struct PriorArguments {
@@ -65,7 +66,7 @@ pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
         may_replace(&maker, given)?;
     }
     let files = [file.clone()];
-    let ready = find_or_make(&maker, &files, arguments.jobs.map_or_else(cores, usize::from))?;
+    let ready = find_or_make(&maker, &files, &file, arguments.jobs.map_or_else(cores, usize::from))?;
     ready.keep(&files)?;
     let reused = ready.from.is_some();
     let prior = ready.model.prior();
@@ -129,13 +130,22 @@ pub fn obtain(
     let maker = PriorMaker::new(config, robot, task, Backend::Simulator)?;
     let shared = maker.shared_file(output);
     let all: Vec<PathBuf> = files.iter().cloned().chain([shared.clone()]).collect();
-    let ready = find_or_make(&maker, &all, cores())?;
+    let ready = find_or_make(&maker, &all, &shared, cores())?;
     ready.keep(&[shared])?;
     Ok(ready)
 }
 
-fn find_or_make(maker: &PriorMaker, files: &[PathBuf], jobs: usize) -> Result<ReadyPrior, Failure> {
+/// Returns the prior that one of `files` has, or makes it. `kept` is the file that it will be kept in: refused before the work where it
+/// cannot be written.
+fn find_or_make(maker: &PriorMaker, files: &[PathBuf], kept: &Path, jobs: usize) -> Result<ReadyPrior, Failure> {
     let task = maker.plan().task.name();
+    if let Some(ready) = maker.find(files, &mut |text| notice!("{text}")) {
+        if let Some(file) = &ready.from {
+            notice!("the prior of {task} is that of {}", file.display());
+        }
+        return Ok(ready);
+    }
+    require_writable(kept, "give another place by --output")?;
     let (begun, bar) = (Instant::now(), std::io::stderr().is_terminal().then(ProgressBar::no_length));
     if let Some(bar) = &bar {
         let style = ProgressStyle::with_template("prior of {msg} {bar:30} {pos}/{len} jumps, {eta} left");
@@ -148,15 +158,12 @@ fn find_or_make(maker: &PriorMaker, files: &[PathBuf], jobs: usize) -> Result<Re
             bar.inc(1);
         }
     };
-    let made = maker.find_or_make(files, jobs, &progress, &AtomicBool::new(false), &mut |text| notice!("{text}"));
+    let made = maker.make(jobs, &progress, &AtomicBool::new(false));
     if let Some(bar) = &bar {
         bar.finish_and_clear();
     }
     let ready = made?;
-    match &ready.from {
-        Some(file) => notice!("the prior of {task} is that of {}", file.display()),
-        None => notice!("the prior of {task} took {:.1} s", begun.elapsed().as_secs_f64()),
-    }
+    notice!("the prior of {task} took {:.1} s", begun.elapsed().as_secs_f64());
     Ok(ready)
 }
 

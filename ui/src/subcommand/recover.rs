@@ -1,6 +1,5 @@
 //! `quadfrog recover`: repairs an incomplete recording.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::put_line;
@@ -11,6 +10,7 @@ use quadfrog::recording::{RecordingError, recover};
 use quadfrog::trial::counted;
 
 use super::failure::Failure;
+use super::output_file::is_of_place;
 
 #[derive(Debug, Args)]
 pub struct RecoverArguments {
@@ -103,13 +103,8 @@ fn refuse_running(RecoverArguments { file, .. }: &RecoverArguments) -> Result<()
 
 /// Returns unusable input for a file that cannot be recovered, another error for a disk that fails.
 fn failure(error: RecordingError) -> Failure {
-    use ErrorKind::{IsADirectory, NotADirectory, NotFound, PermissionDenied};
     match &error {
-        RecordingError::Io { source, .. }
-            if !matches!(source.kind(), NotFound | PermissionDenied | IsADirectory | NotADirectory) =>
-        {
-            Failure::Other(error.into())
-        }
+        RecordingError::Io { source, .. } if !is_of_place(source.kind()) => Failure::Other(error.into()),
         _ => Failure::input(error),
     }
 }

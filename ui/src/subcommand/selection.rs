@@ -10,6 +10,7 @@ use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
 
 use super::failure::Failure;
+use super::output_file::is_of_place;
 
 /// A study to run.
 #[derive(Clone)]
@@ -40,7 +41,7 @@ impl SelectedStudy {
                 ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
                     Failure::input(format!("{what}: a part of its path is a file; give another folder with --output"))
                 }
-                ErrorKind::NotFound | ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+                kind if is_of_place(kind) => {
                     Failure::input(format!("{what}: {source}; give another folder with --output"))
                 }
                 _ => Failure::from(EngineError::System { what, source }),

@@ -17,6 +17,7 @@ use super::arguments::{load_config_for, load_model, user_folder};
 use super::completion;
 use super::console::settings;
 use super::failure::Failure;
+use super::output_file::not_written;
 
 #[derive(Debug, Args)]
 pub struct ConfigCommand {
@@ -136,18 +137,15 @@ fn collect(file: &str, tables: &str, table: &Table, found: &mut Vec<Setting>) {
 fn show(what: &[String], folder: Option<&Path>, model: &str) -> Result<(), Failure> {
     let config = load_config_for(&load_model(model)?.0, folder)?;
     let all = values(&config)?;
-    let wanted = |setting: &&Setting| {
-        what.is_empty() || what.iter().any(|what| *what == setting.file || setting.key.starts_with(what.as_str()))
-    };
-    let shown: Vec<_> = all.iter().filter(wanted).collect();
-    if shown.is_empty() {
-        let what = what.join(" ");
+    let names = |what: &str, setting: &Setting| what == setting.file || setting.key.starts_with(what);
+    if let Some(what) = what.iter().find(|what| !all.iter().any(|setting| names(what, setting))) {
         let files = Config::FILE_NAMES.join(", ");
         return Err(Failure::input(format!(
             "{what}: no key of the configuration begins so; the files are {files}, and `quadfrog config show` shows all keys"
         )));
     }
-    for Setting { file, key, value } in shown {
+    let is_shown = |setting: &&Setting| what.is_empty() || what.iter().any(|what| names(what, setting));
+    for Setting { file, key, value } in all.iter().filter(is_shown) {
         let origin = config.origin(file, key).unwrap_or_else(|| "built-in".to_owned());
         put_line!("{file}  {key} = {value}  # {origin}");
     }
@@ -221,7 +219,7 @@ fn write_schemas(file: Option<&str>, folder: Option<&Path>) -> Result<(), Failur
         };
         let path = folder.join(reference.name).with_extension("schema.json");
         let write = || std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, &text));
-        write().with_context(|| format!("{}: cannot be written", path.display()))?;
+        write().map_err(|error| not_written(&path, &error))?;
         put_line!("{}", path.display());
     }
     Ok(())

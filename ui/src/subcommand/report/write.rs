@@ -1,13 +1,11 @@
 //! Files of a report: written beside their place and renamed, so that a file is whole or as before.
 
-use std::io::Write as _;
 use std::path::Path;
 
-use anyhow::Context;
 use quadfrog::report::{html, svg};
 
 use crate::subcommand::failure::Failure;
-use crate::subcommand::output_file::{require_format, require_place, write_whole};
+use crate::subcommand::output_file::{not_written, require_format, require_place, write_text};
 
 /// Writes a page; an existing file is replaced only if it is a report.
 ///
@@ -16,7 +14,7 @@ use crate::subcommand::output_file::{require_format, require_place, write_whole}
 pub fn write_page(file: &Path, text: &str) -> Result<(), Failure> {
     require_format(file, &["html", "htm"], "a report is a page in HTML")?;
     check(file, "--output", html::is_report)?;
-    write(file, text)
+    write_text(file, text)
 }
 
 /// Writes figures as SVG files of their names into a folder, which is made; an existing file is replaced only if it is a
@@ -32,14 +30,12 @@ pub fn write_figures<'a>(
         return Err(Failure::input(format!("--figures {}: it is a file; give a folder", folder.display())));
     }
     let files: Vec<_> = figures.into_iter().map(|(name, text)| (folder.join(format!("{name}.svg")), text)).collect();
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("{}: cannot be made", folder.display()))
-        .map_err(Failure::Other)?;
+    std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
     for (file, _) in &files {
         check(file, "--figures", svg::is_figure)?;
     }
     for (file, text) in &files {
-        write(file, text)?;
+        write_text(file, text)?;
     }
     Ok(files.len())
 }
@@ -56,9 +52,4 @@ fn check(file: &Path, option: &str, is_ours: fn(&str) -> bool) -> Result<(), Fai
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(error) => refuse(&format!("cannot be read: {error}; give another name")),
     }
-}
-
-fn write(file: &Path, text: &str) -> Result<(), Failure> {
-    let written = write_whole(file, |to| to.write_all(text.as_bytes()));
-    written.with_context(|| format!("{}: cannot be written", file.display())).map_err(Failure::Other)
 }

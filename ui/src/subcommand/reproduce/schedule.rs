@@ -9,6 +9,7 @@ use std::time::Instant;
 use crate::notice;
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
+use nix::sys::signal::Signal;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::in_parallel;
 use tokio::signal::unix::{SignalKind, signal};
@@ -20,8 +21,8 @@ use crate::subcommand::failure::Failure;
 
 /// Share of the work after which the rate is known well enough for a time left.
 const ESTIMATE_FROM: f64 = 0.05;
-/// Exit status of a program that SIGINT ended.
-const INTERRUPTED: i32 = 130;
+/// Exit status of a program that a signal ended, less the signal's number.
+const BY_SIGNAL: i32 = 128;
 
 /// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to `file`.
 /// The results do not depend on the number of threads.
@@ -115,16 +116,16 @@ fn write_when_interrupted(kept: Arc<KeptResults>) -> Result<(), Failure> {
     let (mut interrupt, mut terminate, mut hang_up) =
         (register(SignalKind::interrupt())?, register(SignalKind::terminate())?, register(SignalKind::hangup())?);
     let wait = move || {
-        runtime.block_on(async {
+        let ended_by = runtime.block_on(async {
             tokio::select! {
-                _ = interrupt.recv() => {}
-                _ = terminate.recv() => {}
-                _ = hang_up.recv() => {}
+                _ = interrupt.recv() => Signal::SIGINT,
+                _ = terminate.recv() => Signal::SIGTERM,
+                _ = hang_up.recv() => Signal::SIGHUP,
             }
         });
         let message = kept.keep();
         notice!("{message}");
-        std::process::exit(INTERRUPTED);
+        std::process::exit(BY_SIGNAL + ended_by as i32);
     };
     std::thread::Builder::new().name("interrupt".to_owned()).spawn(wait).map_err(failed)?;
     Ok(())
