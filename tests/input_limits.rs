@@ -68,6 +68,19 @@ fn endless_and_deep_descriptions_are_refused() {
     assert!(refused("<").contains("go1.urdf"));
 }
 
+/// Regression: a link with two parents was added once for each way to it: its mass was doubled, and 30 links with two joints each
+/// took longer than anybody waits.
+#[test]
+fn a_link_with_two_parents_is_refused_at_once() {
+    let joint = |name: &str, link: usize| {
+        let (parent, link) = (format!("<parent link=\"l{link}\"/>"), format!("<child link=\"l{}\"/>", link + 1));
+        format!("<joint name=\"{name}\" type=\"fixed\">{parent}{link}</joint>")
+    };
+    let second: String = (0..29).map(|link| joint(&format!("k{link}"), link)).collect();
+    let message = refused(&chain(30).replace("</robot>", &(second + "</robot>")));
+    assert!(message.contains("link l1") && message.contains("several joints have it as their child"), "{message}");
+}
+
 /// Regression: the read never ended.
 #[test]
 fn a_file_without_an_end_is_refused() {

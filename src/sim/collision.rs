@@ -153,6 +153,11 @@ impl Collider {
         collider
     }
 
+    /// Upper bound of the distance of a point of the robot from the trunk's origin, m.
+    pub fn extent(&self) -> f64 {
+        self.extent
+    }
+
     /// Number of warm-start impulses.
     pub fn warm_start_slots(&self) -> usize {
         self.probes.len() * MAX_TERRAIN_CONTACTS

@@ -53,6 +53,11 @@ use sensors::Sensors;
 use state::PeriodContacts;
 use terrain::Terrain;
 
+/// Step by which a robot is lowered that the nearest ground is beside, m.
+const LOWERING_STEP_M: f64 = 1e-3;
+/// Distance from the ground at which a placed robot touches it, m.
+const LOWERING_TOLERANCE_M: f64 = 1e-12;
+
 /// A simulated robot.
 #[derive(Debug, Clone)]
 pub struct Simulator {
@@ -215,24 +220,35 @@ impl Robot for Simulator {
         Ok(())
     }
 
-    /// Places the robot level at the world's origin, as low as the ground allows, and restarts all random numbers from
-    /// the seed.
+    /// Places the robot level above the world's origin, where it first touches the ground on its way down, and restarts all random
+    /// numbers from the seed.
     fn place(&mut self, placement: &Placement) -> bool {
         self.terrain.reset(placement.seed);
         self.ticks = 0;
         let mut state = SimState { joint_position: placement.joint_position, ..SimState::default() };
-        // Lowered until the first part touches: one iteration on level ground, a few on blocks.
+        // Above everything that the robot could touch.
         state.position_world.z = 2.0;
-        // Above ground that is higher than a metre.
-        state.position_world.z += (1.0 - self.terrain.clearance(&state.position_world)).max(0.0);
-        for _ in 0..200 {
+        while self.terrain.clearance(&state.position_world) < self.collider.extent() {
+            state.position_world.z *= 2.0;
+        }
+        // Lowered by the gap, which on level ground is the way to go, at a slope less. Beside a wall it is the way to the wall and can
+        // be as small as one likes: there by a step, and half of it for each time that the robot is in the ground after it.
+        let (mut free_z, mut step) = (state.position_world.z, LOWERING_STEP_M);
+        while step > LOWERING_TOLERANCE_M {
             self.set_state(&state);
             let gap = self.smallest_gap();
-            if gap < 1e-12 {
-                break;
+            if gap < -LOWERING_TOLERANCE_M {
+                step *= 0.5;
+            } else {
+                free_z = state.position_world.z;
+                if gap < LOWERING_TOLERANCE_M {
+                    break;
+                }
             }
-            state.position_world.z -= gap;
+            state.position_world.z = free_z - gap.max(step);
         }
+        state.position_world.z = free_z;
+        self.set_state(&state);
         self.sensors.reset(placement.seed);
         self.report();
         true

@@ -63,7 +63,7 @@ impl Acceleration {
 /// Contact with the ground during one control period.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PeriodContacts {
-    /// Whether each foot had a contact force in the last step.
+    /// Whether each foot had a contact force in the last step that had any constraint.
     pub foot: PerLeg<bool>,
     /// Impulse on each foot over the period, world, N s.
     pub foot_impulse_world: PerLeg<Vector3<f64>>,

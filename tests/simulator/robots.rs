@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use quadfrog::config::Config;
 use quadfrog::robot::description::RobotFiles;
-use quadfrog::robot::description::{DescriptionError, RobotDescription};
+use quadfrog::robot::description::{DescriptionError, Draft, RobotDescription};
 use quadfrog::robot::{GRAVITY, JointCommand, Leg, MotorCommand, Placement, Robot};
 use quadfrog::sim::{SimConfig, Simulator};
 
@@ -175,6 +175,23 @@ fn impossible_robots_are_refused_by_name() {
     assert!(message.contains("FR_thigh_joint") && message.contains("where a hip is"), "{message}");
     let message = refusal("<origin xyz=\"0 0 -0.213\" rpy=\"0 0 0\"/>", "<origin xyz=\"0 0 -0.2\" rpy=\"0 0 0\"/>");
     assert!(message.contains("calf joint") && message.contains("alike"), "{message}");
+    let message = refusal("<joint name=\"FL_hip_joint\"", "<joint name=\"FR_hip_joint\"");
+    assert!(message.contains("joint FR_hip_joint") && message.contains("a second one has this name"), "{message}");
+    let message = refusal("<link name=\"FR_foot\">", "<link name=\"FL_foot\">");
+    assert!(message.contains("link FL_foot") && message.contains("a second one has this name"), "{message}");
+    let message = refusal("<sphere radius=\"0.02\"/>", "<sphere radius=\"0.04\"/>");
+    assert!(message.contains("FL foot") && message.contains("its radius is 0.02 m, that of FR 0.04 m"), "{message}");
+    let message = refusal("<mass value=\"0.195862\"/>", "<mass value=\"1e-12\"/>");
+    assert!(message.contains("FR_calf") && message.contains("weighs 1 g at least"), "{message}");
+    let message = refusal(
+        "</robot>",
+        "<link name=\"base_imu\"/><joint name=\"b\" type=\"fixed\"><parent link=\"trunk\"/><child link=\"base_imu\"/></joint></robot>",
+    );
+    assert!(message.contains("second inertial unit") && message.contains("imu_link"), "{message}");
+    let own = "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\
+               <joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
+    let message = refusal("</robot>", own);
+    assert!(message.contains("link a") && message.contains("is its own ancestor"), "{message}");
     let message = refusal("</robot>", "");
     assert!(message.contains("go1.urdf"), "{message}");
 
@@ -184,4 +201,48 @@ fn impossible_robots_are_refused_by_name() {
     assert!(matches!(missing, DescriptionError::Read { .. }));
     assert!(refused(GO1, &GO1_TOML.replace("gear_ratio", "gear_ration")).contains("gear_ration"));
     assert!(refused(GO1, &GO1_TOML.replace("-2.75", "-3.0")).contains("-3 rad"));
+}
+
+/// Regression: the name of a link that only contains the letters, as "simulated_camera", made it the inertial unit; a frame that is turned
+/// was taken as the trunk's.
+#[test]
+fn the_inertial_unit_is_the_link_with_that_word_in_its_name() {
+    let camera = |name: &str| {
+        let joint = format!(
+            "<link name=\"{name}\"/><joint name=\"{name}_fixed\" type=\"fixed\"><origin xyz=\"0.3 0 0.1\" rpy=\"0 0 0\"/>"
+        );
+        GO1.replace("</robot>", &(joint + &format!("<parent link=\"trunk\"/><child link=\"{name}\"/></joint></robot>")))
+    };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("go1.urdf"), camera("simulated_camera")).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), GO1_TOML).unwrap();
+    let robot = RobotDescription::from_folder(folder.path()).unwrap();
+    assert_eq!(robot.imu_origin, RobotDescription::embedded("go1").unwrap().imu_origin);
+    let at = GO1.find("imu_fixed").unwrap();
+    let turned = GO1[..at].to_owned() + &GO1[at..].replacen("rpy=\"0 0 0\"", "rpy=\"3.14159 0 0\"", 1);
+    let message = refused(&turned, GO1_TOML);
+    assert!(message.contains("imu_link") && message.contains("is turned by 3.14159 rad"), "{message}");
+}
+
+/// Regression: the end of a capsule on the calf became the foot, with the capsule's radius: the robot stood on what it took for its shin,
+/// and fell.
+#[test]
+fn the_foot_is_a_sphere_and_not_the_end_of_a_capsule() {
+    let capsules = GO1.replace("<box size=\"0.213 0.016 0.016\"/>", "<capsule radius=\"0.008\" length=\"0.22\"/>");
+    assert_ne!(capsules, GO1);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("go1.urdf"), capsules).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), GO1_TOML).unwrap();
+    let robot = RobotDescription::from_folder(folder.path()).unwrap();
+    assert!(robot.legs.iter().all(|leg| leg.foot_radius == 0.02), "{:?}", robot.legs[0].foot_radius);
+    assert_eq!(robot.leg_geometry.calf, 0.213);
+}
+
+/// Regression: a name with a character of no width was written by Rust's rules, and the own file could not be read.
+#[test]
+fn a_draft_quotes_names_as_toml_does() {
+    for name in ["e\u{301}", "a\u{200b}b", "tab\tbed", "\"quoted\""] {
+        let draft = Draft::of_urdf(name, Path::new("go1.urdf"), GO1).unwrap();
+        assert_eq!(draft.robot.name, name);
+    }
 }

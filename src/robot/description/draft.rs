@@ -36,13 +36,15 @@ impl Draft {
         let calf = if folded.abs() >= open.abs() { folded + FOLDED_MARGIN_RAD } else { open - FOLDED_MARGIN_RAD };
         let lying = [within(3, 0.0), within(4, -calf / 2.0), within(5, calf)];
         let file_name = urdf.file_name().unwrap_or_default().to_string_lossy();
-        let mut toml = String::new();
+        let mut toml_text = String::new();
+        // Quoted as TOML does it.
+        let (name, file_name) = (toml::Value::from(name), toml::Value::from(&*file_name));
         let _ = write!(
-            toml,
+            toml_text,
             "# Data of a robot beyond its URDF. Units in the names. Written by `quadfrog init`: values marked \"not known\" are to be\n\
              # replaced, each with its source.\n\n\
-             name = {name:?}\n\
-             urdf = {file_name:?}   # bodies, joints, limits, collision shapes; beside this file\n\n\
+             name = {name}\n\
+             urdf = {file_name}   # bodies, joints, limits, collision shapes; beside this file\n\n\
              [motor]\n\
              rotor_inertia_kgm2 = 0.0            # not known: inertia of one rotor about its own axis\n\
              gear_ratio = [1.0, 1.0, 1.0]        # not known: rotor turns per joint turn of hip, thigh and calf\n\n\
@@ -68,7 +70,7 @@ impl Draft {
                     .to_owned(),
             );
         }
-        let robot = RobotFiles::from_texts(Path::new(""), toml.clone(), text.to_owned()).description()?;
-        Ok(Draft { toml, robot, missing })
+        let robot = RobotFiles::from_texts(Path::new(""), toml_text.clone(), text.to_owned()).description()?;
+        Ok(Draft { toml: toml_text, robot, missing })
     }
 }

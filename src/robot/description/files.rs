@@ -220,7 +220,8 @@ impl RobotFiles {
             }
         }
         let maker_limits = robot.maker_limits.map(|limits| [limits.hip_rad, limits.thigh_rad, limits.calf_rad]);
-        for (i, [low, high]) in maker_limits.iter().flatten().copied().enumerate() {
+        let of_joints = maker_limits.iter().flat_map(|maker| maker.iter().cycle().take(JOINTS));
+        for (i, &[low, high]) in of_joints.enumerate() {
             let (lowest, highest) = (parts.limits.min_position[i], parts.limits.max_position[i]);
             let possible = |angle: f64| angle.abs() <= LARGEST_ANGLE_RAD;
             if !(possible(low) && possible(high)) || low.max(lowest) >= high.min(highest) {

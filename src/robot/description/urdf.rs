@@ -18,7 +18,7 @@ pub(super) struct UrdfContents {
     pub legs: PerLeg<LegDescription>,
     pub leg_geometry: LegGeometry,
     pub limits: JointLimits,
-    /// Origin of a link whose name contains "imu", trunk frame, m.
+    /// Origin of the link of the inertial unit, trunk frame, m: the one that has "imu" in its name, as a word.
     pub imu_origin: Option<Vector3<f64>>,
     pub joint_names: [String; JOINTS],
     pub links: Vec<LinkFrame>,
@@ -27,12 +27,18 @@ pub(super) struct UrdfContents {
 /// Tolerance for lengths and directions that must be equal or zero, m: the precision of a drawing.
 const TOLERANCE: f64 = 1e-6;
 
+/// Least mass of a body: with less the numbers of the simulator are not finite.
+const LEAST_MASS_KG: f64 = 1e-3;
+
 /// Links joined by fixed joints, in the frame of the first one.
 struct FixedLinks<'a> {
     body: RigidBody,
     /// Moving joints of these links, with their origin in the common frame.
     joints: Vec<(&'a Joint, Isometry3<f64>)>,
-    imu_origin: Option<Vector3<f64>>,
+    /// Collision shapes of `body` that are spheres in the URDF, not the ends of a capsule.
+    spheres: Vec<usize>,
+    /// The inertial unit's link and its frame.
+    imu: Option<(&'a str, Isometry3<f64>)>,
 }
 
 /// A parsed URDF with its file name for messages.
@@ -109,13 +115,18 @@ impl<'a> UrdfDocument<'a> {
         // Four hips, each in another quadrant.
         let legs = legs.map(|leg| leg.expect("four distinct legs"));
         let leg_geometry = self.geometry(&legs)?;
-        let links = self.link_frames(&trunk.body.name, &joint_names);
-        let imu_origin = trunk.imu_origin;
+        let links = self.link_frames(&trunk.body.name, &joint_names)?;
+        if let Some((name, frame)) = trunk.imu.filter(|(_, frame)| frame.rotation.angle() > TOLERANCE) {
+            let problem = format!("the inertial unit's frame is turned by {} rad", frame.rotation.angle());
+            let remedy = "its measurements are taken in the trunk's axes: give it rpy=\"0 0 0\", and turn them in the robot's driver";
+            return self.invalid(&format!("link {name}"), problem, remedy);
+        }
+        let imu_origin = trunk.imu.map(|(_, frame)| frame.translation.vector);
         Ok(UrdfContents { trunk: trunk.body, legs, leg_geometry, limits, imu_origin, joint_names, links })
     }
 
     /// Returns all links but `root`, each once and after its parent.
-    fn link_frames(&self, root: &str, joint_names: &[String; JOINTS]) -> Vec<LinkFrame> {
+    fn link_frames(&self, root: &str, joint_names: &[String; JOINTS]) -> Result<Vec<LinkFrame>, DescriptionError> {
         let frame = |joint: &Joint| LinkFrame {
             name: joint.child.link.clone(),
             parent: joint.parent.link.clone(),
@@ -126,20 +137,19 @@ impl<'a> UrdfDocument<'a> {
             let parent = parent.to_owned();
             self.robot.joints.iter().filter(move |joint| joint.parent.link == parent).map(frame)
         };
-        let mut links: Vec<LinkFrame> = Vec::new();
-        let mut known = vec![root.to_owned()];
+        let mut links: Vec<LinkFrame> = children(root).collect();
         let mut next = 0;
-        while let Some(parent) = known.get(next).cloned() {
-            for link in children(&parent) {
-                // A second joint to the same link is no tree; the first one counts.
-                if !known.contains(&link.name) {
-                    known.push(link.name.clone());
-                    links.push(link);
-                }
-            }
+        while let Some(parent) = links.get(next).map(|link| link.name.clone()) {
+            links.extend(children(&parent));
             next += 1;
         }
-        links
+        let is_known = |name: &str| name == root || links.iter().any(|link| link.name == name);
+        match self.robot.links.iter().find(|link| !is_known(&link.name)) {
+            Some(link) => {
+                self.invalid(&format!("link {}", link.name), "is its own ancestor".into(), "joints form a tree")
+            }
+            None => Ok(links),
+        }
     }
 
     /// Converts the chain of three joints that starts with `hip`.
@@ -152,6 +162,7 @@ impl<'a> UrdfDocument<'a> {
         joint_names: &mut [String; JOINTS],
     ) -> Result<LegDescription, DescriptionError> {
         let mut chain = Vec::with_capacity(3);
+        let mut spheres = Vec::new();
         let mut joint_origin = [Vector3::zeros(); 3];
         let (mut joint, mut origin) = (hip, origin);
         for part in 0..3 {
@@ -164,6 +175,7 @@ impl<'a> UrdfDocument<'a> {
             limits.max_torque[i] = joint.limit.effort;
             limits.max_velocity[i] = joint.limit.velocity;
             let links = self.fixed_links(self.link(&joint.child.link)?)?;
+            spheres = links.spheres;
             match (part, &links.joints[..]) {
                 (0 | 1, &[(next, next_origin)]) => (joint, origin) = (next, next_origin),
                 (2, []) => {}
@@ -181,11 +193,10 @@ impl<'a> UrdfDocument<'a> {
         let [hip, thigh, mut calf]: [RigidBody; 3] = chain.try_into().expect("three parts were pushed");
 
         // The foot is the lowest sphere of the calf.
-        let sphere = |shape: &CollisionShape| match *shape {
-            CollisionShape::Sphere { center, radius } => Some((center, radius)),
+        let feet = spheres.into_iter().filter_map(|i| match calf.collision[i] {
+            CollisionShape::Sphere { center, radius } => Some((i, (center, radius))),
             _ => None,
-        };
-        let feet = calf.collision.iter().enumerate().filter_map(|(i, shape)| sphere(shape).map(|s| (i, s)));
+        });
         let Some((i, (foot_origin, foot_radius))) = feet.min_by(|a, b| a.1.0.z.total_cmp(&b.1.0.z)) else {
             let remedy = "add a link with a sphere as collision, fixed to the calf's end";
             return self.invalid(&format!("link {}", calf.name), "has no foot".into(), remedy);
@@ -253,6 +264,10 @@ impl<'a> UrdfDocument<'a> {
                     return self.invalid(&format!("{} {what}", leg.name()), problem, remedy);
                 }
             }
+            if (found.foot_radius - first.foot_radius).abs() > TOLERANCE {
+                let problem = format!("its radius is {} m, that of FR {} m", found.foot_radius, first.foot_radius);
+                return self.invalid(&format!("{} foot", leg.name()), problem, "give all feet the same radius");
+            }
         }
         for (what, length) in [("thigh", geometry.thigh), ("calf", geometry.calf)] {
             if length <= 0.0 {
@@ -272,12 +287,12 @@ impl<'a> UrdfDocument<'a> {
             inertia_com: Matrix3::zeros(),
             collision: Vec::new(),
         };
-        let mut links = FixedLinks { body, joints: Vec::new(), imu_origin: None };
-        self.add(root, Isometry3::identity(), &mut links, 0)?;
+        let mut links = FixedLinks { body, joints: Vec::new(), spheres: Vec::new(), imu: None };
+        self.add(root, Isometry3::identity(), &mut links)?;
         let element = format!("link {}", links.body.name);
         let mass = links.body.mass;
-        if !(mass.is_finite() && mass > 0.0) {
-            return self.invalid(&element, format!("mass {mass} kg"), "the mass of a body must be greater than zero");
+        if !(mass.is_finite() && mass >= LEAST_MASS_KG) {
+            return self.invalid(&element, format!("mass {mass} kg"), "a body of the robot weighs 1 g at least");
         }
         // The principal moments of a rigid body are positive, and none exceeds the sum of the others.
         let moments = links.body.inertia_com.symmetric_eigenvalues();
@@ -294,31 +309,29 @@ impl<'a> UrdfDocument<'a> {
     }
 
     /// Adds `link`, whose frame is `pose` in the common frame, and all links fixed to it.
-    fn add(
-        &self,
-        link: &'a Link,
-        pose: Isometry3<f64>,
-        links: &mut FixedLinks<'a>,
-        depth: usize,
-    ) -> Result<(), DescriptionError> {
-        if depth > self.robot.links.len() {
-            return self.invalid(&format!("link {}", link.name), "is its own ancestor".into(), "joints form a tree");
-        }
+    fn add(&self, link: &'a Link, pose: Isometry3<f64>, links: &mut FixedLinks<'a>) -> Result<(), DescriptionError> {
         if link.inertial.mass.value < 0.0 {
             let problem = format!("mass {} kg", link.inertial.mass.value);
             return self.invalid(&format!("link {}", link.name), problem, "a mass is not negative");
         }
         merge_inertia(&mut links.body, &link.inertial, &pose);
-        if link.name.contains("imu") {
-            links.imu_origin = Some(pose.translation.vector);
+        if is_imu(&link.name)
+            && let Some((other, _)) = links.imu.replace((&link.name, pose))
+        {
+            let problem = format!("is a second inertial unit by its name, beside {other}");
+            return self.invalid(
+                &format!("link {}", link.name),
+                problem,
+                "leave \"imu\" in the name of the one that is read",
+            );
         }
         for collision in &link.collision {
-            self.add_shapes(link, &collision.geometry, pose * isometry(&collision.origin), &mut links.body.collision)?;
+            self.add_shapes(link, &collision.geometry, pose * isometry(&collision.origin), links)?;
         }
         for joint in self.robot.joints.iter().filter(|joint| joint.parent.link == link.name) {
             let origin = pose * isometry(&joint.origin);
             match joint.joint_type {
-                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, links, depth + 1)?,
+                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, links)?,
                 _ => links.joints.push((joint, origin)),
             }
         }
@@ -330,8 +343,9 @@ impl<'a> UrdfDocument<'a> {
         link: &Link,
         geometry: &Geometry,
         pose: Isometry3<f64>,
-        shapes: &mut Vec<CollisionShape>,
+        links: &mut FixedLinks<'a>,
     ) -> Result<(), DescriptionError> {
+        let shapes = &mut links.body.collision;
         let center = pose.translation.vector;
         let rotation = pose.rotation.to_rotation_matrix().into_inner();
         match *geometry {
@@ -348,7 +362,10 @@ impl<'a> UrdfDocument<'a> {
                     shapes.push(CollisionShape::Sphere { center, radius });
                 }
             }
-            Geometry::Sphere { radius } => shapes.push(CollisionShape::Sphere { center, radius }),
+            Geometry::Sphere { radius } => {
+                links.spheres.push(shapes.len());
+                shapes.push(CollisionShape::Sphere { center, radius });
+            }
             Geometry::Mesh { ref filename, .. } => {
                 let remedy = "meshes do not collide here: describe the shape by boxes, cylinders, capsules or spheres";
                 return self.invalid(&format!("link {}", link.name), format!("collision mesh {filename}"), remedy);
@@ -375,6 +392,11 @@ pub(super) fn with_visual_shapes(text: &str) -> Option<String> {
         }
     }
     urdf_rs::write_to_string(&robot).ok()
+}
+
+/// Whether a link is an inertial unit by its name: "imu" is one of its words, as in `base_imu` and `imu_link`.
+fn is_imu(name: &str) -> bool {
+    name.split(|letter: char| !letter.is_ascii_alphabetic()).any(|word| word.eq_ignore_ascii_case("imu"))
 }
 
 /// Adds mass and inertia of a part to `body` by the parallel-axis theorem.

@@ -1,6 +1,8 @@
 //! Limits of a URDF as an input: size and nesting of the text before it is parsed, because the parser follows the nesting with
 //! its stack; every number finite and of a size that a quadruped can have.
 
+use std::collections::HashSet;
+
 use urdf_rs::{Geometry, Joint, JointType, Link, Pose, Robot};
 
 /// Largest number of elements of the text; the Go1's has 330.
@@ -67,7 +69,7 @@ fn tag_length(tag: &str) -> usize {
     tag.bytes().position(ends).unwrap_or(tag.len())
 }
 
-/// Checks the number of links and every number that is used.
+/// Checks the number of links, that names are unique and joints form a tree, and every number that is used.
 pub(super) fn check_robot(robot: &Robot) -> Result<(), Refusal> {
     let links = robot.links.len();
     if links > MOST_LINKS {
@@ -77,8 +79,24 @@ pub(super) fn check_robot(robot: &Robot) -> Result<(), Refusal> {
             "at most 500: leave out what does not move or weigh",
         ));
     }
+    if let Some(name) = repeated(robot.links.iter().map(|link| &link.name)) {
+        return Err((format!("link {name}"), "a second one has this name".to_owned(), "give each link its own name"));
+    }
+    if let Some(name) = repeated(robot.joints.iter().map(|joint| &joint.name)) {
+        return Err((format!("joint {name}"), "a second one has this name".to_owned(), "give each joint its own name"));
+    }
+    if let Some(name) = repeated(robot.joints.iter().map(|joint| &joint.child.link)) {
+        let problem = "several joints have it as their child".to_owned();
+        return Err((format!("link {name}"), problem, "joints form a tree: leave one of them"));
+    }
     robot.links.iter().try_for_each(check_link)?;
     robot.joints.iter().try_for_each(check_joint)
+}
+
+/// Returns the first name that occurs a second time.
+fn repeated<'a>(names: impl IntoIterator<Item = &'a String>) -> Option<&'a String> {
+    let mut known = HashSet::new();
+    names.into_iter().find(|name| !known.insert(*name))
 }
 
 fn check_link(link: &Link) -> Result<(), Refusal> {

@@ -22,8 +22,9 @@ impl LocalProblem {
         LocalProblem { law, friction, delassus, delassus_inverse, slip_ratio: 0.0 }
     }
 
-    /// Returns the impulse that satisfies the law while all other impulses stay, and the largest component of the change of the
-    /// velocity that it makes. `v` is the velocity with the impulse `p` of the last sweep.
+    /// Returns the impulse that satisfies the law while all other impulses stay, with the exceptions that the module
+    /// `contact` names, and the largest component of the change of the velocity that it makes. `v` is the velocity with the
+    /// impulse `p` of the last sweep.
     #[inline]
     pub fn solve(&mut self, v: &Vector3<f64>, p: &Vector3<f64>) -> (Vector3<f64>, f64) {
         // c = v - A p: velocity without the impulse.

@@ -13,9 +13,10 @@ use crate::sim::motion::{GeneralizedVelocity, StepContext};
 use crate::sim::six::dot;
 use crate::sim::terrain::LooseBlock;
 
-/// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out until
-/// the next step.
+/// Most contacts at a time; a robot that lies on blocks has about twenty. Contacts found beyond that are left out.
 const MAX_CONTACTS: usize = 40;
+/// Largest velocity with which a robot leaves ground that it is in: a state that is set there does not throw it.
+const FASTEST_RECOVERY_M_S: f64 = 1.0;
 /// A stop and a friction row per joint.
 const MAX_JOINT_ROWS: usize = 2 * JOINTS;
 
@@ -105,11 +106,11 @@ impl ContactSolver {
     }
 
     /// Part of the right-hand side that a gap adds, from gap + h v >= 0, m/s or rad/s. Of a penetration only a share is
-    /// recovered per step.
+    /// recovered per step, with at most `fastest`.
     #[inline]
-    pub fn gap_velocity(&self, gap: f64, h: f64) -> f64 {
+    pub fn gap_velocity(&self, gap: f64, fastest: f64, h: f64) -> f64 {
         let share = if gap > 0.0 { 1.0 } else { self.config.penetration_recovery };
-        share * gap / h
+        (share * gap / h).max(-fastest)
     }
 
     /// Adds a point near the ground; [`ContactSolver::add_contacts`] takes the last ones.
@@ -133,7 +134,7 @@ impl ContactSolver {
             law: self.law,
             ground_velocity_world: candidates.map(|c| c.ground.block.map_or(Vector3::zeros(), ground_velocity)),
             warm_start_world: candidates.map(|c| self.warm_start[c.warm_start_slot].unwrap_or_default()),
-            gap_velocity: candidates.map(|c| self.gap_velocity(c.ground.gap, step.h)),
+            gap_velocity: candidates.map(|c| self.gap_velocity(c.ground.gap, FASTEST_RECOVERY_M_S, step.h)),
             kept_slip: match self.law {
                 ContactLaw::Coulomb => 0.0,
                 ContactLaw::Convex => self.kept_slip,
