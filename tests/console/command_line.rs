@@ -331,7 +331,12 @@ fn a_place_that_cannot_be_written_is_refused_before_the_work() {
         assert_eq!(fs::read_to_string(program.path("notes.txt")).unwrap(), "notes");
     }
     let message = program.refused(&["screenshot", sample, "--output", "-"]);
-    assert_shows(&message, &["--output -: standard output is the default", "./-"]);
+    assert_shows(&message, &["--output -: it is not standard output here", "./-"]);
+    // Regressions: `report` and `prior` wrote a file of the name `-`.
+    for arguments in [&["report", sample, "-o", "-"][..], &["prior", "--output", "-"]] {
+        assert_shows(&program.refused(arguments), &["--output -: it is not standard output here", "./-"]);
+    }
+    assert!(!program.path("-").exists());
 }
 
 /// Regression: the operator of a user without a name, as in a container, was unknown without a word.

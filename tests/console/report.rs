@@ -334,6 +334,11 @@ fn other_files_are_not_overwritten_and_a_report_is() {
     program.write("figures/forward-motion.svg", "<svg/>");
     assert!(program.refused(&["report", &study, "--figures", "figures"]).contains("forward-motion.svg"));
     assert_eq!(svgs(&program.path("figures")).len(), 1);
+    // Regression: the page was written before the figures were refused.
+    for figures in ["letter.html", "figures"] {
+        assert_shows(&program.refused(&["report", &study, "-o", "new.html", "--figures", figures]), &["--figures"]);
+        assert!(!program.path("new.html").exists(), "{figures}");
+    }
     assert!(program.refused(&["report", &study, "--output", "missing/page.html"]).contains("missing"));
     assert!(program.refused(&["report", &study, "--output", "figures"]).contains("folder"));
     program.text(&["report", &study, "--output", "page.html"]);

@@ -5,9 +5,11 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::time::Instant;
 
 use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
+use nix::sys::stat::Mode;
+use nix::unistd::{Pid, mkfifo};
 use quadfrog::control::settings::TaskControl;
 use quadfrog::trial::Task;
 use quadfrog_console::subcommand::{EXAMPLES, ExperimentConfiguration, minutes, seconds_left};
@@ -174,6 +176,16 @@ fn tables_of_a_checkout_need_every_experiment_and_are_written_between_their_mark
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("needs every experiment"));
     assert_eq!(fs::read_to_string(copy.path().join("README.md")).unwrap(), text);
+    // Regressions: this was refused after the work, and after the report was written.
+    let other = copy.path().join("report");
+    let begin = ["reproduce", "--readme", copied, "--output", other.to_str().unwrap()];
+    let output = quadfrog(&[&begin[..], &["--from", results.to_str().unwrap()]].concat());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!other.exists());
+    let output = quadfrog(&[&begin[..], &arguments].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && message.contains("cannot be used with"), "{message}");
+    assert!(!other.exists());
     // The same results, marked as complete: an experiment without studies has rows without figures.
     let mut whole: Value = serde_json::from_str(&fs::read_to_string(&results).unwrap()).unwrap();
     let all = [
@@ -218,6 +230,89 @@ fn end_by(signal: Signal) {
     assert_eq!(child.wait().unwrap().code(), Some(128 + signal as i32));
     assert!(rest.concat().contains("interrupted: no experiment was complete, nothing was written"), "{rest:?}");
     assert!(!folder.path().join("results.json").exists());
+}
+
+/// Regression: the fewer results of an interrupted run replaced complete ones.
+#[test]
+fn an_interrupt_leaves_complete_results_alone() {
+    // The runs of the transfer follow the studies of the convergence and take half of the time.
+    let arguments = ["--quick", "--trials", "6", "--jobs", "2", "--seed", "41", "--only", "convergence,transfer"];
+    let folder = tempfile::tempdir().unwrap();
+    let begun = Instant::now();
+    reproduce(folder.path(), &arguments);
+    let whole = begun.elapsed();
+    let [complete, kept] = ["results.json", "results.interrupted.json"].map(|name| folder.path().join(name));
+    let before = fs::read(&complete).unwrap();
+    for share in [0.8, 0.7, 0.9, 0.75, 0.85, 0.65, 0.95] {
+        let mut command = Command::new(QUADFROG);
+        command.args(["reproduce", "--output"]).arg(folder.path()).args(arguments);
+        let mut child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(whole.mul_f64(share));
+        kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
+        let message = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
+        child.wait().unwrap();
+        assert!(fs::read(&complete).unwrap() == before, "{message}");
+        if message.contains("the complete experiments") {
+            let from = kept.to_str().unwrap();
+            assert!(message.contains(&format!("`quadfrog reproduce --from {from} --output DIR`")), "{message}");
+            let again = tempfile::tempdir().unwrap();
+            reproduce(again.path(), &["--from", from]);
+            assert_eq!(results(again.path())["experiments"], serde_json::json!(["convergence"]));
+            return;
+        }
+    }
+    panic!("no run was interrupted between its two parts");
+}
+
+/// Regression: a page, a figure and results that are not of this program were replaced.
+#[test]
+fn files_of_another_origin_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let from = root().join("docs/reproduced.json");
+    for (name, text) in [
+        ("report.html", "<!DOCTYPE html><p>mine</p>"),
+        ("results.json", "{\"mine\": 1}"),
+        ("results.interrupted.json", ""),
+        ("convergence.svg", "<svg/>"),
+    ] {
+        let file = folder.path().join(name);
+        fs::write(&file, text).unwrap();
+        for arguments in [&["--from", from.to_str().unwrap()][..], &["--quick"]] {
+            let output = quadfrog(&[&["reproduce", "--output", folder.path().to_str().unwrap()], arguments].concat());
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{message}");
+            assert!(message.contains(name) && message.contains("give another name or remove it"), "{message}");
+        }
+        assert_eq!(fs::read_to_string(&file).unwrap(), text);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        fs::remove_file(&file).unwrap();
+    }
+    // What the same command wrote is replaced.
+    for _ in 0..2 {
+        reproduce(folder.path(), &["--from", from.to_str().unwrap()]);
+    }
+}
+
+/// Regressions: results were read without a limit, and refused without the name of the option, after the folder was made.
+#[test]
+fn results_that_cannot_be_read_are_refused_before_a_folder_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("made");
+    let pipe = folder.path().join("pipe");
+    mkfifo(&pipe, Mode::S_IRWXU).unwrap();
+    let foreign = folder.path().join("foreign.json");
+    fs::write(&foreign, "{}").unwrap();
+    for from in [&folder.path().join("missing.json"), folder.path(), &pipe, Path::new("/dev/zero"), &foreign] {
+        let from = from.to_str().unwrap();
+        let output = quadfrog(&["reproduce", "--output", made.to_str().unwrap(), "--from", from]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(
+            message.contains(&format!("--from {from}: ")) && message.contains("give the results.json"),
+            "{message}"
+        );
+        assert!(!made.exists(), "{from}");
+    }
 }
 
 /// Regression: studies in which nothing stood were left out of the mean best, which then agreed with the paper's.

@@ -19,11 +19,6 @@ pub fn write_file(
     extension: &str,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Failure> {
-    if file.as_os_str() == "-" {
-        return Err(Failure::input(
-            "--output -: standard output is the default, leave --output out; a file of this name is ./-",
-        ));
-    }
     require_place("--output", file)?;
     // What does not exist, or leads nowhere, is written as it is named.
     let place = fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
@@ -40,8 +35,19 @@ pub fn write_file(
     }
 }
 
-/// Refuses a folder, and a file in a folder that does not exist. `option` is the argument that names it.
+/// Refuses the name by which other programs write to standard output. `option` is the argument that gives it.
+pub fn require_name(option: &str, file: &Path) -> Result<(), Failure> {
+    if file.as_os_str() == "-" {
+        let text =
+            format!("{option} -: it is not standard output here; leave {option} out; a file of this name is ./-");
+        return Err(Failure::input(text));
+    }
+    Ok(())
+}
+
+/// Refuses a folder, and a file in a folder that does not exist; also as of [`require_name`].
 pub fn require_place(option: &str, file: &Path) -> Result<(), Failure> {
+    require_name(option, file)?;
     let refuse = |what: &str| Err(Failure::input(format!("{option} {}: {what}", file.display())));
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
@@ -51,6 +57,21 @@ pub fn require_place(option: &str, file: &Path) -> Result<(), Failure> {
         return refuse("it is a folder; give the name of a file in it");
     }
     Ok(())
+}
+
+/// Refuses to replace a file that `is_own` does not recognize as one that the command writes; also as of [`require_place`].
+pub fn require_own(option: &str, file: &Path, is_own: fn(&str) -> bool) -> Result<(), Failure> {
+    let refuse = |what: &str| Err(Failure::input(format!("{option} {}: {what}", file.display())));
+    require_place(option, file)?;
+    if file.metadata().is_ok_and(|about| !about.is_file()) {
+        return refuse("it is not a regular file; give another name");
+    }
+    match fs::read(file) {
+        Ok(bytes) if is_own(&String::from_utf8_lossy(&bytes)) => Ok(()),
+        Ok(_) => refuse("the file exists and is not part of a report; give another name or remove it"),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => refuse(&format!("cannot be read: {error}; give another name")),
+    }
 }
 
 /// Refuses a name that says another format than that of the first of `extensions`; one that says none passes. `contents` names

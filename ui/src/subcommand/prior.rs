@@ -22,7 +22,7 @@ use serde_json::json;
 use super::arguments::{self, whole_number};
 use super::completion;
 use super::failure::Failure;
-use super::output_file::require_writable;
+use super::output_file::{require_name, require_writable};
 
 #[derive(Debug, Args)]
 pub struct PriorArguments {
@@ -63,6 +63,7 @@ pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
     let given = arguments.output.clone();
     let file = given.clone().unwrap_or_else(|| maker.shared_file(Path::new("recordings")));
     if let Some(given) = &given {
+        require_name("--output", given)?;
         may_replace(&maker, given)?;
     }
     let files = [file.clone()];

@@ -15,8 +15,9 @@ use quadfrog::report::{html, study_page, svg, text};
 use super::arguments::VERSION;
 use super::completion;
 use super::failure::Failure;
+use super::output_file::write_text;
 pub use load::load;
-pub use write::{write_figures, write_page};
+use write::{figure_files, require_page};
 
 /// Width of tables where the output is no terminal, characters.
 const WIDTH: usize = 80;
@@ -54,6 +55,9 @@ fn choice(text: &str) -> Result<TrialChoice, String> {
 }
 
 pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
+    if let Some(file) = &arguments.output {
+        require_page(file)?;
+    }
     let mut studies = Vec::new();
     for place in &arguments.places {
         studies.extend(load(place)?);
@@ -69,13 +73,17 @@ pub fn run(arguments: &ReportArguments) -> Result<(), Failure> {
         }
     }
     let page = study_page::page(&studies, &arguments.trials, VERSION);
+    // Before the page is written: where a figure is refused nothing is.
+    let figures = arguments.figures.as_deref().map(|folder| figure_files(folder, &page)).transpose()?;
     if let Some(file) = &arguments.output {
-        write_page(file, &html::render(&page))?;
+        write_text(file, &html::render(&page))?;
         notice!("report: {}", file.display());
     }
-    if let Some(folder) = &arguments.figures {
-        let count = write_figures(folder, page.figures().map(|figure| (figure.name.as_str(), svg::draw(figure))))?;
-        notice!("{count} figures: {}", folder.display());
+    if let (Some(folder), Some(figures)) = (&arguments.figures, &figures) {
+        for (file, figure) in figures {
+            write_text(file, &svg::draw(figure))?;
+        }
+        notice!("{} figures: {}", figures.len(), folder.display());
     }
     if arguments.json {
         output::line(&page.to_json().to_string());

@@ -23,11 +23,15 @@ use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
 use super::arguments::whole_number;
 use super::failure::Failure;
-use super::output_file::{not_written, write_text};
+use super::output_file::{not_written, require_own, require_writable, write_text};
 pub use schedule::{minutes, seconds_left};
 
 /// Name of the results in the output folder.
 const RESULTS_FILE: &str = "results.json";
+/// Name of the results of an interrupted run, beside those of a complete one.
+const INTERRUPTED_FILE: &str = "results.interrupted.json";
+/// Name of the report in the output folder.
+const REPORT_FILE: &str = "report.html";
 /// Width of the tables on the terminal, characters.
 const WIDTH: usize = 120;
 
@@ -56,30 +60,28 @@ pub struct ReproduceArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "only", "seed", "trials", "jobs"])]
     from: Option<PathBuf>,
     /// Also renew the table and figures of README.md and docs/ in this checkout
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "only")]
     readme: Option<PathBuf>,
 }
 
 pub fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
-    // Before minutes of work: a folder that cannot be written is an error of the input.
-    let folder = &arguments.output;
-    std::fs::create_dir_all(folder).map_err(|error| unusable(folder, &error))?;
-    let file = folder.join(RESULTS_FILE);
-    let permit = std::fs::OpenOptions::new().append(true).create(true).open(&file).and_then(|opened| opened.metadata());
-    if permit.map_err(|error| unusable(&file, &error))?.len() == 0 {
-        std::fs::remove_file(&file).map_err(|error| unusable(&file, &error))?;
-    }
+    // Before minutes of work: what cannot be read or written is an error of the input.
+    let given = arguments.from.as_deref().map(ReproduceResults::read).transpose().map_err(Failure::input)?;
     if let Some(checkout) = &arguments.readme {
-        readme::check(checkout)?;
+        readme::check(checkout, given.as_ref())?;
     }
-    let results = match &arguments.from {
-        Some(from) => ReproduceResults::read(from).map_err(Failure::input)?,
+    let folder = &arguments.output;
+    let file = folder.join(RESULTS_FILE);
+    require_replaceable(folder)?;
+    require_writable(&file, "give another folder by --output")?;
+    let results = match given {
+        Some(results) => results,
         None => {
             let experiments = chosen(&arguments.only);
             let size = ExperimentSize::new(arguments.seed, arguments.quick);
             let size = arguments.trials.map_or(size, |trials| size.at_most(trials));
             let threads = arguments.jobs.map_or_else(cores, usize::from);
-            schedule::run_experiments(&experiments, size, arguments.quick, threads, &file)?
+            schedule::run_experiments(&experiments, size, arguments.quick, threads, &folder.join(INTERRUPTED_FILE))?
         }
     };
     // Before the page: what took minutes is kept whatever comes of it.
@@ -90,7 +92,7 @@ pub fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
         readme::renew(&results, checkout)?;
     }
     output::text(&text::render(&page, WIDTH));
-    notice!("the report is {}", folder.join("report.html").display());
+    notice!("the report is {}", folder.join(REPORT_FILE).display());
     Ok(())
 }
 
@@ -101,13 +103,25 @@ fn chosen(only: &[PaperExperiment]) -> Vec<PaperExperiment> {
 }
 
 fn write(page: &Page, folder: &Path) -> Result<(), Failure> {
-    write_text(&folder.join("report.html"), &html::render(page))?;
+    write_text(&folder.join(REPORT_FILE), &html::render(page))?;
     for figure in page.figures() {
         write_text(&folder.join(format!("{}.svg", figure.name)), &svg::draw(figure))?;
     }
     Ok(())
 }
 
-fn unusable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::input(format!("--output: {}: cannot be written: {error}; give another folder", path.display()))
+/// Refuses an output folder with a page, results or a figure that are not of this program: they may be replaced.
+fn require_replaceable(folder: &Path) -> Result<(), Failure> {
+    let Ok(entries) = folder.read_dir() else { return Ok(()) };
+    for file in entries.flatten().map(|entry| entry.path()) {
+        let name = file.file_name().unwrap_or_default();
+        if name == REPORT_FILE {
+            require_own("--output", &file, html::is_report)?;
+        } else if name == RESULTS_FILE || name == INTERRUPTED_FILE {
+            require_own("--output", &file, results::is_results)?;
+        } else if file.extension().is_some_and(|extension| extension == "svg") {
+            require_own("--output", &file, svg::is_figure)?;
+        }
+    }
+    Ok(())
 }

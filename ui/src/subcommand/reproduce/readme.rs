@@ -21,11 +21,15 @@ const MARKERS: [&str; 2] = [
     "<!-- end: written by `quadfrog reproduce --readme` -->",
 ];
 
-/// Checks that `checkout` has the texts whose tables are renewed.
+/// Checks that `checkout` has the texts whose tables are renewed, and that `given` results have every experiment.
 ///
 /// # Errors
-/// When a text or its markers are missing.
-pub fn check(checkout: &Path) -> Result<(), Failure> {
+/// When an experiment, a text or its markers are missing.
+pub fn check(checkout: &Path, given: Option<&ReproduceResults>) -> Result<(), Failure> {
+    let all = <PaperExperiment as clap::ValueEnum>::value_variants();
+    if given.is_some_and(|results| !all.iter().all(|experiment| results.has(*experiment))) {
+        return Err(Failure::input("--readme: needs every experiment; give results that were made without --only"));
+    }
     texts().iter().try_for_each(|(name, _)| parts(&checkout.join(name)).map(drop))
 }
 
@@ -39,12 +43,8 @@ fn texts() -> [GeneratedText; 2] {
 /// Writes tables, figures and the reduced results into `checkout`.
 ///
 /// # Errors
-/// When an experiment is missing, or a file cannot be written.
+/// When a text has lost its markers, or a file cannot be written.
 pub fn renew(results: &ReproduceResults, checkout: &Path) -> Result<(), Failure> {
-    let all = <PaperExperiment as clap::ValueEnum>::value_variants();
-    if !all.iter().all(|experiment| results.has(*experiment)) {
-        return Err(Failure::input("--readme: needs every experiment; leave --only away"));
-    }
     let reduced = results.reduced();
     let claims = claims(&reduced);
     for (name, table) in texts() {

@@ -4,13 +4,18 @@ use std::io::Write as _;
 use std::path::Path;
 
 use quadfrog::optimize::ask::SamplerKind;
+use quadfrog::robot::description::read_text_within;
 use quadfrog::session::effort::JumpEffort;
 use quadfrog::trial::{MeasuredJump, ParameterValues, Task, Verdict};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::configuration::ExperimentConfiguration;
 use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, RunJob, RunPoint, StudyJob};
 use crate::subcommand::output_file::write_whole;
+
+/// Largest file of results, bytes: more than ten times one of the whole size.
+const LARGEST_RESULTS: u64 = 1 << 27;
 
 /// All results, in the order of the jobs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -139,11 +144,13 @@ impl ReproduceResults {
     /// Reads results from a file.
     ///
     /// # Errors
-    /// When it cannot be read, or is not of this program.
+    /// When it cannot be read, or is not of this program, with the remedy.
     pub fn read(file: &Path) -> Result<ReproduceResults, String> {
-        let text = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-        let remedy = "give the results.json of `quadfrog reproduce --output DIR`";
-        serde_json::from_str(&text).map_err(|error| format!("{}: {error}; {remedy}", file.display()))
+        let refuse = |error: &dyn std::fmt::Display| {
+            format!("--from {}: {error}; give the results.json of `quadfrog reproduce --output DIR`", file.display())
+        };
+        let text = read_text_within(file, LARGEST_RESULTS, "results").map_err(|error| refuse(&error))?;
+        serde_json::from_str(&text).map_err(|error| refuse(&error))
     }
 
     /// Writes the results to a file.
@@ -288,6 +295,12 @@ impl TrialResult {
     pub fn rise_m(&self) -> f64 {
         self.measured.as_ref().map_or(0.0, |measured| measured.apex_m)
     }
+}
+
+/// Whether a text is one of results, of this version or another.
+pub fn is_results(text: &str) -> bool {
+    let value: Value = serde_json::from_str(text).unwrap_or_default();
+    value["experiments"].is_array() && value["studies"].is_array() && value["runs"].is_array()
 }
 
 fn six_digits(value: f64) -> f64 {

@@ -24,7 +24,8 @@ const ESTIMATE_FROM: f64 = 0.05;
 /// Exit status of a program that a signal ended, less the signal's number.
 const BY_SIGNAL: i32 = 128;
 
-/// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to `file`.
+/// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to
+/// `interrupted`.
 /// The results do not depend on the number of threads.
 ///
 /// # Errors
@@ -34,7 +35,7 @@ pub fn run_experiments(
     size: ExperimentSize,
     quick: bool,
     threads: usize,
-    file: &Path,
+    interrupted: &Path,
 ) -> Result<ReproduceResults, Failure> {
     let jobs = all_jobs(experiments, &size);
     let robot = RobotDescription::embedded("go1").map_err(Failure::input)?;
@@ -42,7 +43,7 @@ pub fn run_experiments(
     let kept = Arc::new(KeptResults {
         results: Mutex::new(ReproduceResults::new(size, quick)),
         asked: experiments.to_vec(),
-        file: file.to_owned(),
+        file: interrupted.to_owned(),
     });
     write_when_interrupted(Arc::clone(&kept))?;
     let progress = JobProgress::new(&jobs, threads);
@@ -96,7 +97,7 @@ impl KeptResults {
         let file = self.file.display();
         match results.write(&self.file) {
             Ok(()) => format!(
-                "interrupted: {file} has the complete experiments ({}); `quadfrog reproduce --from {file}` makes their report",
+                "interrupted: {file} has the complete experiments ({}); `quadfrog reproduce --from {file} --output DIR` makes their report",
                 names.join("; ")
             ),
             Err(failure) => format!("interrupted: {file} could not be written: {failure}"),
