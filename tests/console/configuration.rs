@@ -101,6 +101,30 @@ fn the_configuration_of_the_user_is_in_force_unless_another_one_is_given() {
     assert_shows(&refused, &["own/quadfrog: holds no configuration file"]);
 }
 
+/// Regression: a folder of the user that could not be read, as without the permission, was none: its limits were left out.
+#[test]
+fn a_configuration_of_the_user_that_cannot_be_read_is_refused() {
+    let program = Program::new();
+    let own = program.path("own");
+    let run = |arguments: &[&str]| {
+        let output = program.command(arguments).env("XDG_CONFIG_HOME", &own).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    // Neither is a folder; the permission does not bind the user root.
+    program.write("own/quadfrog", "notes");
+    let (status, message) = run(&["optimize", "--trials", "1"]);
+    assert_eq!(status, Some(2), "{message}");
+    assert_shows(&message, &["own/quadfrog cannot be read: ", "Not a directory", "--config DIR"]);
+    assert!(!program.path("recordings").exists());
+    fs::remove_file(program.path("own/quadfrog")).unwrap();
+    std::os::unix::fs::symlink("quadfrog", program.path("own/quadfrog")).unwrap();
+    let (status, message) = run(&["config", "show"]);
+    assert_eq!(status, Some(2), "{message}");
+    assert_shows(&message, &["own/quadfrog cannot be read: ", "symbolic links"]);
+    program.write("given/safety.toml", "[fall]\npitch_rad = 0.8\n");
+    assert_eq!(run(&["config", "show", "--config", "given"]).0, Some(0));
+}
+
 #[test]
 fn a_new_configuration_is_valid_and_differs_in_nothing_until_it_is_edited() {
     let program = Program::new();
@@ -237,6 +261,24 @@ fn a_robot_is_begun_from_its_urdf() {
     assert_shows(&program.refused(&["init", "three.urdf", "robots/three"]), &["three.urdf"]);
     assert!(!program.path("robots/three").exists(), "nothing is written for a URDF that is refused");
     assert_shows(&program.refused(&["init", "none.urdf", "robots/none"]), &["none.urdf", "cannot be read"]);
+}
+
+/// Regressions: a robot without a name was accepted, and one in the present folder was named `robot`.
+#[test]
+fn a_new_robot_has_a_printable_name_or_that_of_its_folder() {
+    let program = Program::new();
+    let urdf = repository().join("robots/a1/a1.urdf");
+    let urdf = urdf.to_str().unwrap();
+    for name in ["", " ", "two\nlines", "\u{202e}left"] {
+        assert_shows(&program.refused(&["init", urdf, "named", "--name", name]), &["--name", "1 to 100 characters"]);
+    }
+    let message = program.refused(&["init", urdf, "two\u{1b}lines"]);
+    assert_shows(&message, &["1 to 100 characters", "give the robot's name with --name"]);
+    assert!(!program.path("named").exists());
+    fs::create_dir(program.path("pony")).unwrap();
+    let output = program.command(&["init", urdf, "."]).current_dir(program.path("pony")).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(fs::read_to_string(program.path("pony/robot.toml")).unwrap().contains("name = \"pony\""));
 }
 
 /// The answers to a shell, and the script that it runs, in bash itself.

@@ -1,7 +1,7 @@
 //! Arguments that several commands share, and parsers for the engine's named values.
 
 use std::fmt::Display;
-use std::fs::DirEntry;
+use std::io::{self, ErrorKind};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -85,13 +85,13 @@ pub fn load_model(model: &str) -> Result<(RobotFiles, RobotDescription), Failure
 
 /// Loads the configuration of a command: that of `--config`, else the user's own, else the built-in one.
 pub fn load_config(given: Option<&Path>) -> Result<Config, Failure> {
-    Ok(Config::load(given.map(Path::to_owned).or_else(user_config).as_deref())?)
+    Ok(Config::load(given_or_user(given)?.as_deref())?)
 }
 
 /// Loads the configuration of a command with a robot: as [`load_config`], laid over the robot's own. Reports the values of the
 /// robot's own that do not apply, as when the user's own holds whole files for another robot.
 pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Config, Failure> {
-    let given = given.map(Path::to_owned).or_else(user_config);
+    let given = given_or_user(given)?;
     let config = Config::load_for(robot, given.as_deref())?;
     for (folder, file) in given.iter().flat_map(|folder| Config::FILE_NAMES.map(|file| (folder, file))) {
         if let replaced @ [_, ..] = config.replaced(file) {
@@ -102,14 +102,36 @@ pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Confi
     Ok(config)
 }
 
-/// Returns the user's own configuration, if there is one, and reports that it is used.
-fn user_config() -> Option<PathBuf> {
+/// Returns the given configuration, else the user's own, if there is one; reports that the user's own is used.
+fn given_or_user(given: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
+    if let Some(given) = given {
+        return Ok(Some(given.to_owned()));
+    }
+    let Some(own) = user_folder() else { return Ok(None) };
+    let has_toml = has_toml(&own).map_err(|error| {
+        let remedy = "correct it, or name another configuration with --config DIR where the command has this option";
+        Failure::input(format!("the configuration {} cannot be read: {error}; {remedy}", own.display()))
+    })?;
     // One without a TOML file is as good as none.
-    let is_toml = |entry: DirEntry| entry.path().extension().is_some_and(|extension| extension == "toml");
-    let has_toml = |folder: &PathBuf| folder.read_dir().is_ok_and(|entries| entries.flatten().any(is_toml));
-    let own = user_folder().filter(has_toml)?;
+    if !has_toml {
+        return Ok(None);
+    }
     notice!("configuration: {}", own.display());
-    Some(own)
+    Ok(Some(own))
+}
+
+/// Whether a folder has a TOML file; not if the folder does not exist.
+fn has_toml(folder: &Path) -> io::Result<bool> {
+    let entries = match folder.read_dir() {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        entries => entries?,
+    };
+    for entry in entries {
+        if entry?.path().extension().is_some_and(|extension| extension == "toml") {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Returns the place of the user's own configuration, by the XDG Base Directory Specification: `$XDG_CONFIG_HOME/quadfrog`, where the
@@ -141,7 +163,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub output: PathBuf,
     /// Name of the operator, for the recording [default: the user's name]
-    #[arg(long, value_name = "NAME", value_parser = operator)]
+    #[arg(long, value_name = "NAME", value_parser = printable_name)]
     operator: Option<String>,
 }
 
@@ -221,11 +243,11 @@ impl DdsArguments {
     }
 }
 
-/// Longest name of an operator, characters.
+/// Longest name of an operator, a machine or a robot, characters.
 const LONGEST_NAME: usize = 100;
 
-/// Parses the name of an operator.
-pub fn operator(text: &str) -> Result<String, String> {
+/// Parses the name of an operator, a machine or a robot.
+pub fn printable_name(text: &str) -> Result<String, String> {
     let length = text.chars().count();
     if text.trim().is_empty() || length > LONGEST_NAME || text.chars().any(is_unprintable) {
         return Err(format!("a name has 1 to {LONGEST_NAME} characters, none of them a control character"));
@@ -236,9 +258,9 @@ pub fn operator(text: &str) -> Result<String, String> {
 /// Returns the name of the operator: the given one, or else the user's. Reports once that there is none.
 pub fn operator_or_user(given: Option<&String>) -> String {
     static REPORTED: Once = Once::new();
-    let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| operator(&std::env::var(name).ok()?).ok());
+    let of_user = || ["USER", "LOGNAME"].iter().find_map(|name| printable_name(&std::env::var(name).ok()?).ok());
     // Neither variable is set in a container.
-    let of_login = || operator(&User::from_uid(getuid()).ok()??.name).ok();
+    let of_login = || printable_name(&User::from_uid(getuid()).ok()??.name).ok();
     given.cloned().or_else(of_user).or_else(of_login).unwrap_or_else(|| {
         REPORTED
             .call_once(|| notice!("the operator is unknown, as this user has no name; give one with --operator NAME"));
@@ -256,7 +278,7 @@ impl StudyArguments {
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
         Provenance {
             commit: env!("QUADFROG_COMMIT").to_owned(),
-            host: host.and_then(|host| operator(host.trim()).ok()).unwrap_or_else(unknown),
+            host: host.and_then(|host| printable_name(host.trim()).ok()).unwrap_or_else(unknown),
             operator: operator_or_user(self.operator.as_ref()),
         }
     }

@@ -29,7 +29,7 @@ pub struct AttachArguments {
     #[arg(value_name = "SESSION", add = ArgValueCandidates::new(completion::sessions))]
     session: Option<String>,
     /// Your name in the session's log [default: the user's name]
-    #[arg(long, value_name = "NAME", value_parser = arguments::operator)]
+    #[arg(long, value_name = "NAME", value_parser = arguments::printable_name)]
     operator: Option<String>,
     /// Folder with your own console.toml
     #[arg(long, value_name = "DIR")]

@@ -8,7 +8,7 @@ use quadfrog::config::{Config, write_new_files};
 use quadfrog::robot::description::{Draft, read_text};
 use quadfrog::trial::{Backend, Task};
 
-use super::arguments::load_config;
+use super::arguments::{load_config, printable_name};
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -20,7 +20,7 @@ pub struct InitArguments {
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
     /// Name of the robot [default: that of the folder]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = printable_name)]
     name: Option<String>,
 }
 
@@ -31,8 +31,7 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let refuse = |reason: &dyn std::fmt::Display| Failure::input(format!("{}: {reason}", urdf.display()));
     let text =
         read_text(urdf).map_err(|error| refuse(&format!("cannot be read: {error}; give the URDF of a robot")))?;
-    let of_folder = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
-    let name = name.clone().or_else(of_folder).unwrap_or_else(|| "robot".to_owned());
+    let name = name.clone().map_or_else(|| name_of(folder), Ok)?;
     let draft = Draft::of_urdf(&name, urdf, &text).map_err(Failure::input)?;
     let urdf_name = urdf.file_name().unwrap_or_default();
     let files = [(Path::new("robot.toml"), &draft.toml), (Path::new(urdf_name), &text)];
@@ -57,6 +56,14 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     }
     put_line!("\nNext: quadfrog --model {}", folder.display());
     Ok(())
+}
+
+/// Returns the name of a robot whose folder this is; that of `.` is the name of the present folder.
+fn name_of(folder: &Path) -> Result<String, Failure> {
+    let whole = folder.canonicalize().unwrap_or_default();
+    let name = folder.file_name().or(whole.file_name()).unwrap_or_default();
+    printable_name(&name.to_string_lossy())
+        .map_err(|reason| Failure::input(format!("{}: {reason}; give the robot's name with --name", folder.display())))
 }
 
 /// Returns whether a task can run on the simulated robot, in words.
