@@ -133,7 +133,6 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     }
     let Some(task) = session.task else { return Err(refuse("its task is not known to this version".into())) };
     let (config, robot) = (attached_config(&mut player)?, attached_robot(&mut player)?);
-    let rows = rows(&player);
     let damaged =
         |player: &Player| player.damage().map_or(Ok(()), |damage| Err(refuse(format!("it is damaged: {damage}"))));
     damaged(&player)?;
@@ -141,17 +140,33 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     let settings = config.settings(&robot, task, Backend::Simulator).map_err(|error| refuse(error.to_string()))?;
     let simulator = Simulator::new(&robot, &config.simulator).map_err(|error| refuse(error.to_string()))?;
     let mut rollout = Rollout::new(simulator, &settings);
+    let compared = compare_trials(&mut player, &mut rollout, &config, task);
+    // A damaged chunk is found while it is played; its missing ticks are no difference of the simulation.
+    damaged(&player)?;
+    compared
+}
+
+/// Compares the ticks of every trial with those of the simulation up to the first difference.
+fn compare_trials(
+    player: &mut Player,
+    rollout: &mut Rollout<Simulator>,
+    config: &Config,
+    task: Task,
+) -> Result<Verification, VerifyError> {
+    let path = player.path().to_owned();
+    let refuse = |reason: String| VerifyError::NotVerifiable { path: path.clone(), reason };
+    let rows = rows(player);
     let (mut trials, mut ticks, mut left_out) = (0, 0, Vec::new());
     let mut present: Option<ExpectedTicks> = None;
     // The trial of the last tick that had one, compared or left out.
     let mut last = None;
-    for played in player.by_ref() {
+    for played in player {
         let Played::Tick(tick) = played else { continue };
         let Some(trial) = tick.trial else { continue };
         if last != Some(trial) {
             last = Some(trial);
             if let Some(mut ended) = present.take() {
-                if let Some(found) = ended.compare(&mut rollout, None) {
+                if let Some(found) = ended.compare(rollout, None) {
                     return Ok(Verification::Different(found));
                 }
                 ticks += ended.compared;
@@ -160,7 +175,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
                 return Err(refuse(format!("trial {trial} has ticks but no row in the trial table")));
             };
             if matches!(row.suggested, Some(Verdict::Accept | Verdict::Fall)) {
-                let specs = specs(&config, task, row).ok_or_else(|| {
+                let specs = specs(config, task, row).ok_or_else(|| {
                     refuse(format!("trial {trial} has no seed: it was recorded by an older version, or the study was begun by another program"))
                 })?;
                 trials += 1;
@@ -170,21 +185,19 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
             }
         }
         if let Some(expected) = &mut present
-            && let Some(found) = expected.compare(&mut rollout, Some(&tick))
+            && let Some(found) = expected.compare(rollout, Some(&tick))
         {
             return Ok(Verification::Different(found));
         }
     }
-    // A damaged chunk is found while it is played.
-    damaged(&player)?;
     if let Some(mut ended) = present {
-        if let Some(found) = ended.compare(&mut rollout, None) {
+        if let Some(found) = ended.compare(rollout, None) {
             return Ok(Verification::Different(found));
         }
         ticks += ended.compared;
     }
     if trials == 0 {
-        return Err(VerifyError::NoTrial { path: path.into() });
+        return Err(VerifyError::NoTrial { path });
     }
     Ok(Verification::Equal { trials, ticks, left_out })
 }

@@ -273,3 +273,17 @@ fn rerun_takes_the_blueprint_that_the_script_writes() {
         assert!(recording.windows(topic.len()).any(|window| window == topic.as_bytes()), "{topic} is not recorded");
     }
 }
+
+/// Regression: a time after the end of the recording gave a table without a row, with status 0.
+#[test]
+fn a_time_after_the_end_is_refused_with_the_end() {
+    let program = Program::new();
+    let recording = recording(&program);
+    let end_s = Player::open(&recording).unwrap().duration_ns() as f64 / 1e9;
+    for time in ["500..600", "500.."] {
+        let message = program.refused(&["export", &recording, "--time", time, "-o", "late.csv"]);
+        assert_shows(&message, &["--time 500..: after the end of ", "session.mcap", &format!("{end_s:.3} s")]);
+    }
+    assert!(!program.path("late.csv").exists());
+    program.text(&["export", &recording, "--time", "0..600", "-o", "all.csv"]);
+}

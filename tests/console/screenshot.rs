@@ -204,3 +204,25 @@ fn a_moving_picture_shows_the_screens_one_after_the_other() {
 
     assert_shows(&program.refused(&["screenshot", sample.to_str().unwrap(), "--animate", "0"]), &["at most 30 s"]);
 }
+
+/// Regression: of a recording that is cut off or damaged the picture was drawn without a message, with status 0.
+#[test]
+fn damage_is_reported_after_the_picture_was_written() {
+    let program = Program::new();
+    let recording = std::fs::read_dir(sample()).unwrap().map(|entry| entry.unwrap().path());
+    let recording = recording.into_iter().find(|file| file.extension().is_some_and(|extension| extension == "mcap"));
+    let whole = std::fs::read(recording.unwrap()).unwrap();
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 1;
+    std::fs::write(program.path("cut.mcap.part"), &whole[..whole.len() / 2]).unwrap();
+    std::fs::write(program.path("flipped.mcap"), &flipped).unwrap();
+    for (file, damage) in [("cut.mcap.part", "cut off"), ("flipped.mcap", "damaged")] {
+        let output = program.run(&["screenshot", file, "-o", "screen.svg"]);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        let recover = format!("`quadfrog recover {file}` keeps what can be read");
+        assert_shows(&message, &["screenshot: screen.svg", file, damage, &recover, "what can be read is drawn"]);
+        assert!(std::fs::read_to_string(program.path("screen.svg")).unwrap().ends_with("</svg>\n"));
+        std::fs::remove_file(program.path("screen.svg")).unwrap();
+    }
+}

@@ -158,3 +158,18 @@ fn a_file_that_cannot_be_verified_is_refused_with_the_reason() {
     assert_eq!(verified(&program, &program.path("noise.mcap")).0, Some(2));
     assert_eq!(verified(&program, &program.path("nothing.mcap")).0, Some(2));
 }
+
+/// Regression: the ticks that a damaged chunk has lost were reported as a difference of the simulation.
+#[test]
+fn damage_is_no_difference_of_the_simulation() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--record", "all"]);
+    let mut bytes = std::fs::read(program.study("recordings").join("session.mcap")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(program.path("damaged.mcap"), bytes).unwrap();
+    let (status, _, error) = verified(&program, &program.path("damaged.mcap"));
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["damaged.mcap: not verifiable: it is damaged", "1 of "]);
+    assert!(!error.contains("in the simulation"), "{error}");
+}

@@ -16,6 +16,7 @@ use quadfrog::trial::counted;
 
 use super::arguments::{one_of, whole_number};
 use super::completion;
+use super::damage::require_no_damage;
 use super::failure::Failure;
 use super::output_file::write_file;
 use super::replay::{is_written, lacks_its_end_alone};
@@ -123,6 +124,13 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         let several = "--time: its files are of several sessions, each with its own begin; give one of the files";
         return Err(Failure::input(format!("{}: {several}", file.display())));
     }
+    let end_ns = players.iter().map(Player::duration_ns).max().unwrap_or(0);
+    if let Some((from_ns, _)) = arguments.time
+        && from_ns > end_ns
+    {
+        let (from_s, end_s) = (from_ns as f64 / 1e9, end_ns as f64 / 1e9);
+        return Err(Failure::input(format!("--time {from_s}..: after the end of {}, {end_s:.3} s", file.display())));
+    }
     if let Some(trial) = arguments.trial {
         require_trial(&players, trial).map_err(|refusal| Failure::input(format!("{}: {refusal}", file.display())))?;
         // What is lost of other files is no loss of this trial.
@@ -155,14 +163,8 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         let end_s = player.duration_ns() as f64 / 1e9;
         notice!("{}: a session still writes it; it is exported up to {end_s:.3} s", player.path().display());
     }
-    let damage = |player: &&Player| {
-        let way = format!("; `quadfrog recover {}` keeps what can be read", player.path().display());
-        player.damage().map(|damage| format!("{damage}{}", if damage.is_recoverable { &way } else { "" }))
-    };
-    match others.iter().filter_map(damage).collect::<Vec<_>>() {
-        damage if damage.is_empty() => Ok(()),
-        damage => Err(Failure::Other(anyhow!("{}\n  what can be read is exported", damage.join("\n")))),
-    }
+    let damage: Vec<_> = others.iter().filter_map(|player| player.damage()).collect();
+    require_no_damage(&damage, "what can be read is exported")
 }
 
 /// Refuses a trial of which no tick is recorded.

@@ -7,6 +7,7 @@ mod bench;
 mod completion;
 mod configuration;
 mod console;
+mod damage;
 mod doctor;
 mod emulate;
 mod evaluate;

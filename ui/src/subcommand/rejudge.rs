@@ -12,6 +12,7 @@ use quadfrog::trial::Verdict;
 use serde_json::{Value, json};
 
 use super::arguments;
+use super::damage::require_no_damage;
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -48,14 +49,7 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
     } else {
         print(&results, rejudging.unit());
     }
-    match rejudging.damage() {
-        damage if damage.is_empty() => Ok(()),
-        damage => Err(anyhow::anyhow!(
-            "{}; a trial of which ticks are missing there is judged by what is left",
-            damage.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
-        )
-        .into()),
-    }
+    require_no_damage(&rejudging.damage(), "a trial of which ticks are missing there is judged by what is left")
 }
 
 fn name(verdict: Option<Verdict>) -> &'static str {

@@ -21,10 +21,13 @@ use quadfrog::trial::counted;
 
 use super::arguments;
 use super::console::{ScreenArguments, options};
+use super::damage::{damage_text, require_no_damage, without_present_ends};
 use super::failure::Failure;
 
 /// Folder of the studies, where no file is named.
 const RECORDINGS: &str = "recordings";
+/// Use of a damaged recording.
+const DONE: &str = "what can be read is played";
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
@@ -79,25 +82,16 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         files.extend(of_second);
     }
     // What a session still writes is not damaged by having no end.
-    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
+    let written: Vec<PathBuf> = files.iter().filter(|file| is_written(file)).cloned().collect();
     let mut cuts = recording.cuts();
     cuts.extend(second.iter().flat_map(Timeline::cuts));
     let damage_of = |mut damage: Vec<Damage>| {
-        damage.retain(|damage| !(written.contains(&&damage.path) && cuts.contains(&damage.to_string())));
+        without_present_ends(&mut damage, &written, &cuts);
         damage
-    };
-    let repair = |damage: Vec<Damage>| {
-        let damaged = damage.iter().filter(|damage| damage.is_recoverable);
-        let commands: Vec<String> =
-            damaged.map(|damage| format!("quadfrog recover {}", damage.path.display())).collect();
-        let remedy =
-            if commands.is_empty() { String::new() } else { format!("\n{} repairs it", commands.join(" and ")) };
-        let damage = damage.iter().map(|damage| format!("{damage}; the rest can be played"));
-        Failure::Other(anyhow!("{}{remedy}", damage.collect::<Vec<_>>().join("\n")))
     };
     terminal::check().map_err(|error| match damage_of(recording.damage()) {
         damage if damage.is_empty() => Failure::input(error),
-        damage => Failure::Input(format!("{}\n{error}", message(repair(damage)))),
+        damage => Failure::Input(format!("{}\n{error}", damage_text(&damage, DONE))),
     })?;
     let console = console.with_robot(recorded_robot(&mut recording));
     let mut feed = Feed::beside(recording, second, arguments.follow);
@@ -107,7 +101,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let damage = feed.damage();
     let ended = app::run(feed, console)?;
     let damage = damage_of(std::mem::take(&mut *damage.lock().unwrap_or_else(PoisonError::into_inner)));
-    if ended == ConsoleExit::HungUp || damage.is_empty() { Ok(()) } else { Err(repair(damage)) }
+    if ended == ConsoleExit::HungUp { Ok(()) } else { require_no_damage(&damage, DONE) }
 }
 
 /// Returns what a recording tells of its robot. Of an older one, without its files: the built-in robot of that name. Of one whose
@@ -129,13 +123,6 @@ pub fn recorded_robot(recording: &mut Timeline) -> RobotFacts {
     match (config, session.backend) {
         (Ok(config), Some(backend)) => RobotFacts::new(robot, &config, backend, session.seed),
         _ => RobotFacts { description: Some(robot), ..RobotFacts::default() },
-    }
-}
-
-fn message(failure: Failure) -> String {
-    match failure {
-        Failure::Input(message) => message,
-        Failure::Other(error) => error.to_string(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::sync::PoisonError;
 
 use crate::feed::Feed;
 use crate::keymap::Key;
@@ -19,9 +20,10 @@ use quadfrog::trial::TrialRecord;
 
 use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
+use super::damage::{require_no_damage, without_present_ends};
 use super::failure::Failure;
 use super::output_file::{require_format, write_file};
-use super::replay::recorded_robot;
+use super::replay::{is_written, recorded_robot};
 
 /// Of the pictures.
 const EXTENSION: &str = "svg";
@@ -95,7 +97,10 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
         require_format(path, &[EXTENSION], "a screenshot is a picture in SVG")?;
     }
     let config = arguments::load_config(arguments.config.as_deref())?;
-    let mut recording = Timeline::open(&recordings_of(&arguments.file)?)?;
+    let files = recordings_of(&arguments.file)?;
+    let written: Vec<PathBuf> = files.iter().filter(|file| is_written(file)).cloned().collect();
+    let mut recording = Timeline::open(&files)?;
+    let cuts = recording.cuts();
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
@@ -139,13 +144,12 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
         Some(path) => {
             write_file(path, EXTENSION, |file| file.write_all(picture.as_bytes()))?;
             notice!("screenshot: {}", path.display());
-            Ok(())
         }
-        None => {
-            output::data(&picture);
-            Ok(())
-        }
+        None => output::data(&picture),
     }
+    let mut damage = std::mem::take(&mut *feed.damage().lock().unwrap_or_else(PoisonError::into_inner));
+    without_present_ends(&mut damage, &written, &cuts);
+    require_no_damage(&damage, "what can be read is drawn")
 }
 
 fn show(model: &mut Model, feed: &mut Feed) {

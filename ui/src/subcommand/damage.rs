@@ -1,0 +1,28 @@
+//! Damage of recordings, as the commands report it that use what is left.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use quadfrog::recording::player::Damage;
+
+use super::failure::Failure;
+
+/// Fails for damaged recordings, with the text of [`damage_text`]; exit status 1.
+pub fn require_no_damage(damage: &[Damage], done: &str) -> Result<(), Failure> {
+    if damage.is_empty() { Ok(()) } else { Err(Failure::Other(anyhow!(damage_text(damage, done)))) }
+}
+
+/// Returns the damage of each file with the command that repairs it, then `done`: the use that the command makes of the rest.
+pub fn damage_text(damage: &[Damage], done: &str) -> String {
+    let line = |damage: &Damage| match damage.is_recoverable {
+        true => format!("{damage}; `quadfrog recover {}` keeps what can be read", damage.path.display()),
+        false => damage.to_string(),
+    };
+    format!("{}\n  {done}", damage.iter().map(line).collect::<Vec<_>>().join("\n"))
+}
+
+/// Removes the damage of files that are `written` by a session and lack nothing but their end. `cuts` are the missing ends of all
+/// files, each with the file's name.
+pub fn without_present_ends(damage: &mut Vec<Damage>, written: &[PathBuf], cuts: &[String]) {
+    damage.retain(|damage| !(written.contains(&damage.path) && cuts.contains(&damage.to_string())));
+}
