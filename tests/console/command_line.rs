@@ -8,7 +8,7 @@ use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::program::{Program, assert_shows, hold, journal_trials};
+use crate::program::{Program, assert_shows, hold, journal_trials, with_small_files};
 use crate::skip::skip;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::record::Record;
@@ -337,6 +337,80 @@ fn a_place_that_cannot_be_written_is_refused_before_the_work() {
         assert_shows(&program.refused(arguments), &["--output -: it is not standard output here", "./-"]);
     }
     assert!(!program.path("-").exists());
+}
+
+/// Regression: on a full disk a page and a schema were cut off, and nothing was left of what stood there before.
+#[test]
+fn manual_pages_and_schemas_are_written_whole_or_not_at_all() {
+    let program = Program::new();
+    let complete = |folder: &str, file: &str| fs::read_to_string(program.path(folder).join(file)).unwrap();
+    program.text(&["man", "man"]);
+    program.text(&["config", "schema", "-o", "schemas"]);
+    // 512 bytes are less than each of them.
+    for (arguments, folder) in [(&["man", "man"][..], "man"), (&["config", "schema", "-o", "schemas"], "schemas")] {
+        let names = || fs::read_dir(program.path(folder)).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut before: Vec<_> = names().map(|name| name.into_string().unwrap()).collect();
+        before.sort();
+        let texts: Vec<_> = before.iter().map(|name| complete(folder, name)).collect();
+        let (status, message) = with_small_files(&program, 1, arguments);
+        assert_eq!(status, Some(1), "{message}");
+        assert_shows(&message, &[folder, "cannot be written", "File too large"]);
+        let mut after: Vec<_> = names().map(|name| name.into_string().unwrap()).collect();
+        after.sort();
+        assert_eq!(before, after);
+        assert!(before.iter().map(|name| complete(folder, name)).eq(texts), "{folder}: a file is cut off");
+    }
+    assert!(complete("man", "quadfrog.1").contains("quadfrog"));
+    assert!(complete("man", "quadfrog-study-list.1").contains("quadfrog"));
+}
+
+/// Regressions: `bench` hid the reason for which `optimize` had failed, took the figure of a script that had failed and one of 0,
+/// and a duration that is too short for a measurement.
+#[test]
+fn bench_reports_why_a_program_failed_and_refuses_a_duration_that_measures_nothing() {
+    let program = Program::new();
+    for seconds in ["0", "1e-9", "601", "nan"] {
+        assert_shows(&program.refused(&["bench", "--seconds", seconds]), &["--seconds ", "give 0.1 to 600"]);
+    }
+    let failed = |script: &str| {
+        program.write("mujoco.py", script);
+        let output = program.run(&["bench", "--seconds", "0.1", "--mujoco", "mujoco.py"]);
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let figure = "print('{\"mj_steps_per_s_standing\": 1000}')";
+    let message = failed(&format!("import sys\n{figure}\nsys.exit('no model')"));
+    assert_shows(&message, &["mujoco.py ended with exit status: 1: no model"]);
+    for none in ["0", "-1", "NaN", "1e999"] {
+        assert_shows(
+            &failed(&figure.replace("1000", none)),
+            &["mujoco.py: printed no mj_steps_per_s_standing above 0"],
+        );
+    }
+    program.write("own/quadfrog/safety.toml", "[fall]\nrol_rad = 0.9\n");
+    let mut bench = program.command(&["bench", "--seconds", "0.1"]);
+    let output = bench.env("XDG_CONFIG_HOME", program.path("own")).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_shows(&message, &["optimize ended with exit status: 2: ", "safety.toml:2", "rol_rad"]);
+}
+
+/// Regression: a server that does not answer was reported as "Resource temporarily unavailable", without a remedy.
+#[test]
+fn a_redis_server_that_does_not_answer_is_reported_with_the_remedy() {
+    let program = Program::new();
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("redis://{}/0", silent.local_addr().unwrap());
+    let message = || {
+        let output = program.run(&["report", &address]);
+        assert_eq!(output.status.code(), Some(1));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let unanswered = message();
+    assert_shows(&unanswered, &[&address, "it does not answer within 5 s; start it or correct the address"]);
+    assert!(!unanswered.contains("os error"), "{unanswered}");
+    drop(silent);
+    assert_shows(&message(), &[&address, "Connection refused", "; start it or correct the address"]);
 }
 
 /// Regression: the operator of a user without a name, as in a container, was unknown without a word.

@@ -44,8 +44,8 @@ pub enum JournalError {
     #[error("the wait for the Redis server {address} was ended; it is not known whether the last lines were written")]
     ServerWaitEnded { address: String },
     /// The address has no password.
-    #[error("cannot {action} the journal on the Redis server {address}: {source}")]
-    Redis { action: &'static str, address: String, source: ::redis::RedisError },
+    #[error("cannot {action} the journal on the Redis server {address}: {reason}")]
+    Redis { action: &'static str, address: String, reason: String },
 }
 
 impl JournalError {

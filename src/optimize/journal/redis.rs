@@ -157,7 +157,7 @@ impl JournalRedis {
             self.connection = None;
             let address = self.address.clone();
             if !self.answered || !is_passing(&source) || waited.elapsed() >= RECONNECT_TIMEOUT {
-                break Err(JournalError::Redis { action, address, source });
+                break Err(JournalError::Redis { action, address, reason: in_words(&source) });
             }
             self.wait.set(Some(WaitedFor::Server));
             let until = waited.elapsed() + pause;
@@ -193,6 +193,15 @@ impl JournalRedis {
         self.answered = true;
         Ok(answer)
     }
+}
+
+/// Returns an error with the remedy against a server that cannot be reached.
+fn in_words(error: &RedisError) -> String {
+    const REMEDY: &str = "start it or correct the address";
+    if error.is_timeout() {
+        return format!("it does not answer within {} s; {REMEDY}", ANSWER_TIMEOUT.as_secs());
+    }
+    if error.is_connection_refusal() { format!("{error}; {REMEDY}") } else { error.to_string() }
 }
 
 /// Whether an error may pass with time: no connection, a lost one, no answer in time, or a server that starts or hands over.

@@ -1,7 +1,8 @@
 //! Speed of the simulator and of whole studies on this machine, compared with MuJoCo on request.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Instant;
 
 use crate::put_line;
@@ -12,6 +13,9 @@ use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
 use super::machine;
 use crate::subcommand::failure::Failure;
 use quadfrog::session::parallel::cores;
+
+/// Durations of a measurement, s: the least one holds some thousand steps on a slow machine.
+const SECONDS: RangeInclusive<f64> = 0.1..=600.0;
 
 #[derive(Debug, Args)]
 pub struct SpeedArguments {
@@ -27,8 +31,9 @@ pub struct SpeedArguments {
 }
 
 pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
-    if !(arguments.seconds > 0.0 && arguments.seconds <= 600.0) {
-        return Err(Failure::input(format!("--seconds {}: give more than 0 and at most 600", arguments.seconds)));
+    if !SECONDS.contains(&arguments.seconds) {
+        let (given, least, most) = (arguments.seconds, *SECONDS.start(), *SECONDS.end());
+        return Err(Failure::input(format!("--seconds {given}: give {least} to {most}")));
     }
     if let Some(script) = arguments.mujoco.as_ref().filter(|script| !script.is_file()) {
         return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
@@ -68,22 +73,32 @@ fn studies(arguments: &[&str]) -> Result<f64, Failure> {
     let start = Instant::now();
     let mut optimize = Command::new(program);
     optimize.arg("optimize").args(arguments).arg("--output").arg(&folder);
-    optimize.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let status = optimize.status().context("optimize could not be started")?;
+    let output = optimize.stdin(Stdio::null()).output().context("optimize could not be started")?;
     let seconds = start.elapsed().as_secs_f64();
     // A leftover in the temporary directory is harmless.
     let _ = std::fs::remove_dir_all(&folder);
-    if status.success() { Ok(seconds) } else { Err(anyhow!("optimize ended with {status}").into()) }
+    if output.status.success() { Ok(seconds) } else { Err(ended("optimize", &output)) }
 }
 
 /// Returns MuJoCo's steps per second, measured by the script.
 fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
     let output = Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()).output();
     let output = output.context("python3 could not be started")?;
+    let name = script.display();
+    if !output.status.success() {
+        return Err(ended(&name.to_string(), &output));
+    }
     let text = String::from_utf8_lossy(&output.stdout);
     let value: Option<serde_json::Value> = text.lines().rev().find_map(|line| serde_json::from_str(line).ok());
-    value.and_then(|value| value["mj_steps_per_s_standing"].as_f64()).ok_or_else(|| {
+    let steps = value.and_then(|value| value["mj_steps_per_s_standing"].as_f64());
+    steps.filter(|steps| steps.is_finite() && *steps > 0.0).ok_or_else(|| {
         let errors = String::from_utf8_lossy(&output.stderr);
-        Failure::Other(anyhow!("{}: printed no mj_steps_per_s_standing: {}", script.display(), errors.trim()))
+        anyhow!("{name}: printed no mj_steps_per_s_standing above 0: {}", errors.trim()).into()
     })
+}
+
+/// Returns the failure of a program that ended with another status than 0, with its messages.
+fn ended(name: &str, output: &Output) -> Failure {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    anyhow!("{name} ended with {}: {}", output.status, errors.trim()).into()
 }

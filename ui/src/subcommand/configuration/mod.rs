@@ -17,7 +17,7 @@ use super::arguments::{load_config_for, load_model, user_folder};
 use super::completion;
 use super::console::settings;
 use super::failure::Failure;
-use super::output_file::not_written;
+use super::output_file::{not_written, write_text};
 
 #[derive(Debug, Args)]
 pub struct ConfigCommand {
@@ -218,8 +218,8 @@ fn write_schemas(file: Option<&str>, folder: Option<&Path>) -> Result<(), Failur
             continue;
         };
         let path = folder.join(reference.name).with_extension("schema.json");
-        let write = || std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, &text));
-        write().map_err(|error| not_written(&path, &error))?;
+        std::fs::create_dir_all(folder).map_err(|error| not_written(folder, &error))?;
+        write_text(&path, &text)?;
         put_line!("{}", path.display());
     }
     Ok(())
