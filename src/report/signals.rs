@@ -3,7 +3,8 @@
 //! command begin with `command_`, the simulator's true state with `truth_`, the battery with `battery_`.
 
 use std::io::{self, Write};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::sync_channel;
+use std::thread::Builder;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -132,24 +133,44 @@ impl Signals {
         format: TableFormat,
         out: &mut (dyn Write + Send),
     ) -> io::Result<u64> {
-        let mut columns = self.columns();
-        let mut writer = TableWriter::new(format, out, &columns)?;
+        match self.export_in_parallel(players, range, format, out)? {
+            Some(rows) => Ok(rows),
+            None => self.export_alone(players, range, format, out),
+        }
+    }
+
+    /// Exports with two more threads: reading, filling columns and encoding at the same time. Returns none, with nothing read and
+    /// written, where the system does not give the threads.
+    fn export_in_parallel(
+        &self,
+        players: &mut [Player],
+        range: SignalRange,
+        format: TableFormat,
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<Option<u64>> {
         std::thread::scope(|scope| {
-            // Reading, filling columns and encoding at the same time; two batches go round.
-            let (read, blocks) = sync_channel(2);
-            scope.spawn(move || range.read(players, &read));
+            // Two batches go round.
             let (full, batches) = sync_channel::<Vec<TypedColumn>>(0);
             let (emptied, empty) = sync_channel::<Vec<TypedColumn>>(2);
-            let encoder = scope.spawn(move || {
-                for mut columns in batches {
+            let encode = move || {
+                // Without a first batch there is no reader.
+                let Ok(first) = batches.recv() else { return Ok(()) };
+                let mut writer = TableWriter::new(format, out, &first)?;
+                for mut columns in std::iter::once(first).chain(batches) {
                     writer.write(&columns)?;
                     columns.iter_mut().for_each(TypedColumn::clear);
                     // The reader may have ended.
                     let _ = emptied.send(columns);
                 }
                 writer.finish()
-            });
-            let mut spare = Some(self.columns());
+            };
+            let Ok(encoder) = Builder::new().spawn_scoped(scope, encode) else { return Ok(None) };
+            let (read, blocks) = sync_channel(2);
+            let reader = move || range.read(players, |block| read.send(block).is_ok());
+            if Builder::new().spawn_scoped(scope, reader).is_err() {
+                return Ok(None);
+            }
+            let (mut columns, mut spare) = (self.columns(), Some(self.columns()));
             let mut rows = 0;
             for block in &blocks {
                 rows += block.len() as u64;
@@ -167,8 +188,34 @@ impl Signals {
             let _ = full.send(columns);
             drop(full);
             encoder.join().unwrap_or_else(|_| Err(io::Error::other("the encoder panicked; please report it")))?;
-            Ok(rows)
+            Ok(Some(rows))
         })
+    }
+
+    /// Exports on the calling thread.
+    fn export_alone(
+        &self,
+        players: &mut [Player],
+        range: SignalRange,
+        format: TableFormat,
+        out: &mut (dyn Write + Send),
+    ) -> io::Result<u64> {
+        let mut columns = self.columns();
+        let mut writer = TableWriter::new(format, out, &columns)?;
+        let (mut rows, mut written) = (0, Ok(()));
+        range.read(players, |block| {
+            rows += block.len() as u64;
+            self.push(&mut columns, &block);
+            if columns[0].rows() >= BATCH_ROWS {
+                written = writer.write(&columns);
+                columns.iter_mut().for_each(TypedColumn::clear);
+            }
+            written.is_ok()
+        });
+        written?;
+        writer.write(&columns)?;
+        writer.finish()?;
+        Ok(rows)
     }
 
     fn columns(&self) -> Vec<TypedColumn> {
@@ -325,8 +372,8 @@ fn extend<T: Cell>(column: &mut TypedColumn, values: impl Iterator<Item = T>) {
 }
 
 impl SignalRange {
-    /// Sends the ticks in blocks until their end or that of the receiver.
-    fn read(&self, players: &mut [Player], read: &SyncSender<Vec<Stamped>>) {
+    /// Passes the ticks in blocks to `take`, until their end or until it returns false.
+    fn read(&self, players: &mut [Player], mut take: impl FnMut(Vec<Stamped>) -> bool) {
         for player in players {
             let start_utc_ns = player.start_utc_ns();
             let Some(first_ns) = self.first_ns(player) else { continue };
@@ -344,7 +391,7 @@ impl SignalRange {
                 if block.is_empty() {
                     break;
                 }
-                if read.send(block).is_err() {
+                if !take(block) {
                     return;
                 }
             }

@@ -2,13 +2,15 @@
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::Builder;
 
 /// Returns the number of cores that this process may use.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-/// Runs `run` on every item, on at most `threads` threads with a state of `state` each. The order of the results is that of
+/// Runs `run` on every item, on at most `threads` threads with a state of `state` each: on those that the system gives, on the calling
+/// thread if it gives none. The order of the results is that of
 /// `items`; items are begun in that order.
 ///
 /// # Errors
@@ -31,8 +33,12 @@ pub fn in_parallel<I: Sync, S, R: Send, E: Send>(
         }
     };
     let parts: Result<Vec<_>, E> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+        let started =
+            (0..threads.clamp(1, items.len().max(1))).map_while(|_| Builder::new().spawn_scoped(scope, work).ok());
+        let workers: Vec<_> = started.collect();
+        let alone = workers.is_empty().then(work);
+        let joined = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        joined.chain(alone).collect()
     });
     let mut results: Vec<(usize, R)> = parts?.into_iter().flatten().collect();
     results.sort_by_key(|(index, _)| *index);

@@ -2,6 +2,7 @@
 
 use std::process::{Command, Output};
 
+use crate::program::{Program, without_threads};
 use serde_json::Value;
 
 fn evaluate(arguments: &[&str]) -> Output {
@@ -199,5 +200,24 @@ fn the_fast_example_stands_at_more_than_1_3_m_per_second() {
         let speed = run["measured"]["dx_m"].as_f64().unwrap() / touchdown_s;
         assert!(run["fell"] == false && run["measured"]["flights"] == 1, "{run}");
         assert!(speed > 1.3 && (run["value"].as_f64().unwrap() - speed).abs() < 1e-12, "{run}");
+    }
+}
+
+/// Regression: without a free thread, as in a container with a limit of processes, `evaluate` and `prior` ended with a panic.
+#[test]
+fn without_a_free_thread_the_results_are_the_same() {
+    let program = Program::new();
+    program.write("small/prior.toml", "worlds = 2\npoints = 16\n");
+    let point = "f0=1.25,Fx=75,Fz=250";
+    let evaluate = ["evaluate", "--task", "forward", "--point", point, "--seeds", "0-2", "--json", "--jobs", "2"];
+    let prior = ["prior", "--config", "small", "--json", "--jobs", "2", "--output"];
+    for (with, without) in [
+        (evaluate.to_vec(), evaluate.to_vec()),
+        ([&prior[..], &["one.json"]].concat(), [&prior[..], &["two.json"]].concat()),
+    ] {
+        let expected = program.text(&with);
+        let output = without_threads(&program, &without);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(String::from_utf8(output.stdout).unwrap().replace("two.json", "one.json"), expected);
     }
 }

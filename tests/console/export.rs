@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::program::{Program, assert_shows, with_small_files};
+use crate::program::{Program, assert_shows, with_small_files, without_threads};
 use crate::skip::skip;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
@@ -286,4 +286,18 @@ fn a_time_after_the_end_is_refused_with_the_end() {
     }
     assert!(!program.path("late.csv").exists());
     program.text(&["export", &recording, "--time", "0..600", "-o", "all.csv"]);
+}
+
+/// Regression: without a free thread, as in a container with a limit of processes, the export ended with a panic.
+#[test]
+fn without_a_free_thread_the_table_is_the_same() {
+    let program = Program::new();
+    let recording = recording(&program);
+    for file in ["csv", "json", "parquet"] {
+        let [with, without] = [format!("with.{file}"), format!("without.{file}")];
+        program.text(&["export", &recording, "-o", &with]);
+        let output = without_threads(&program, &["export", &recording, "-o", &without]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(fs::read(program.path(&with)).unwrap() == fs::read(program.path(&without)).unwrap(), "{file} differs");
+    }
 }

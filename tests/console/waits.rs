@@ -3,13 +3,12 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
-use crate::program::{Program, assert_shows};
+use crate::program::{Program, assert_shows, without_threads};
 use crate::pty::Session;
-use crate::skip::skip;
 
 /// A study of two trials.
 fn study(program: &Program) -> PathBuf {
@@ -92,24 +91,7 @@ fn a_worker_that_waits_for_another_ones_trial_says_so() {
 #[test]
 fn threads_that_the_system_does_not_grant_are_an_error() {
     let program = Program::new();
-    // The superuser has no such limit.
-    fs::set_permissions(program.path(""), fs::Permissions::from_mode(0o777)).unwrap();
-    let superuser = fs::metadata("/proc/self").unwrap().uid() == 0;
-    let mut command = Command::new(if superuser { "setpriv" } else { "env" });
-    if superuser {
-        command.args(["--reuid", "65534", "--regid", "65534", "--clear-groups"]);
-    }
-    // A copy that every user may run.
-    let copy = program.path("quadfrog");
-    fs::copy(env!("CARGO_BIN_EXE_quadfrog"), &copy).unwrap();
-    command
-        .args(["prlimit", "--nproc=1"])
-        .arg(&copy)
-        .args(["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"]);
-    let Ok(output) = command.current_dir(program.path("")).output() else {
-        skip("setpriv is not installed");
-        return;
-    };
+    let output = without_threads(&program, &["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"]);
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(!message.contains("panicked") && !message.contains("defect"), "{message}");

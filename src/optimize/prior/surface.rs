@@ -76,7 +76,7 @@ pub fn surfaces(prior: &Prior, hyper: &SurfaceHyperparameters) -> Option<(Vec<us
     Some((known, Surfaces::through(prior, &hyper.value, &values)?, Surfaces::through(prior, &hyper.label, &labels)?))
 }
 
-/// Fits the hyperparameters of values and labels, each on a thread of its own.
+/// Fits the hyperparameters of values and labels, at the same time where the system gives a thread.
 pub fn fit(prior: &Prior) -> Result<SurfaceHyperparameters, PriorModelError> {
     let values = || {
         let known = prior.worlds.iter().filter(|world| world.stood() >= LEAST_STOOD);
@@ -84,11 +84,11 @@ pub fn fit(prior: &Prior) -> Result<SurfaceHyperparameters, PriorModelError> {
     };
     let labels = || fit_series(prior, &prior.worlds.iter().map(Series::label).collect::<Vec<_>>());
     let (value, label) = std::thread::scope(|scope| {
-        let value = scope.spawn(values);
+        let started = std::thread::Builder::new().spawn_scoped(scope, values);
         let label = labels();
-        (value.join(), label)
+        let joined = started.map(|value| value.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        (joined.unwrap_or_else(|_| values()), label)
     });
-    let value = value.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     Ok(SurfaceHyperparameters { value: value.ok_or(PriorModelError::Fit)?, label: label.ok_or(PriorModelError::Fit)? })
 }
 

@@ -1,7 +1,9 @@
 //! Complete runs of the program in a temporary folder.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -152,4 +154,20 @@ pub fn with_small_files(program: &Program, blocks: u32, arguments: &[&str]) -> (
     command.args(["-c", &shell, env!("CARGO_BIN_EXE_quadfrog")]).args(arguments).current_dir(program.path(""));
     let output = command.output().unwrap();
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Runs the command so that the system gives it no further thread.
+pub fn without_threads(program: &Program, arguments: &[&str]) -> Output {
+    // A copy that every user may run.
+    let copy = program.path("quadfrog");
+    fs::copy(env!("CARGO_BIN_EXE_quadfrog"), &copy).unwrap();
+    let mut command = Command::new("bash");
+    command.args(["-c", "ulimit -u 1; exec \"$0\" \"$@\""]).arg(copy).args(arguments);
+    command.current_dir(program.path("")).env("XDG_CONFIG_HOME", program.path("no-configuration"));
+    if nix::unistd::Uid::effective().is_root() {
+        // The limit does not bind the user root.
+        command.uid(54_322);
+        fs::set_permissions(program.path(""), Permissions::from_mode(0o777)).unwrap();
+    }
+    command.output().unwrap()
 }
