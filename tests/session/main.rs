@@ -23,6 +23,7 @@ mod judged_by;
 mod limits;
 mod measure;
 mod operator_lost;
+mod queue;
 mod repeats;
 mod robot_study;
 mod search;

@@ -27,14 +27,24 @@ pub struct OpenProposal {
     /// The study at the time at which the trial begins: every verdict is reported in it.
     study: Study,
     changes: Changes,
-    /// The draft was queued in the study with the pending verdict only: in the study its number may belong to another trial by now.
-    only_with_verdict: bool,
+    waits_in: WaitsIn,
     configured: ParameterValues,
     /// The gains of the trial without changes: the configured ones, or those of its origin. Those that are parameters of the
     /// study have the values of the point instead.
     gains: ParameterValues,
     /// Parameters of the draft that the operator has fixed for some trials.
     fixed: Vec<(String, f64)>,
+}
+
+/// Place in which the waiting trial of a draft waits; without meaning for a draft of the sampler.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WaitsIn {
+    /// The study.
+    Study,
+    /// The copy of the study with the pending verdict: its re-run. In the study its number may belong to another trial by now.
+    Verdict,
+    /// The copy of the study, as the next repeat that confirms the best; it is queued with its approval.
+    Confirmation,
 }
 
 /// Values of an open proposal at its approval.
@@ -45,7 +55,7 @@ pub struct ApprovedProposal {
     pub overrides: Vec<(String, f64)>,
     /// The fixed parameters, without those that were changed for this trial.
     pub fixed: ParameterValues,
-    pub only_with_verdict: bool,
+    pub waits_in: WaitsIn,
 }
 
 impl ApprovedProposal {
@@ -57,9 +67,8 @@ impl ApprovedProposal {
 
 impl OpenProposal {
     /// Drafts the next trial of `study`. The parameters `fixed` are not searched unless the draft was queued with other values
-    /// of its own, or repeats a point to confirm the best. `in_study` is true if the waiting trial of the study with the pending
-    /// verdict waits in the study, too. `gains` are the configured ones; `revision` must be one that no earlier proposal had.
-    pub fn new(study: Study, in_study: bool, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> OpenProposal {
+    /// of its own, or repeats a point to confirm the best. `waits_in` is the place of the first waiting trial. `gains` are the configured ones; `revision` must be one that no earlier proposal had.
+    pub fn new(study: Study, waits_in: WaitsIn, fixed: &[(String, f64)], gains: &Gains, revision: u32) -> OpenProposal {
         let next = study.waiting().next();
         let queued = next.map(Trial::fixed).unwrap_or_default();
         let confirms = next.is_some_and(attributes::confirms);
@@ -67,7 +76,7 @@ impl OpenProposal {
         let fixed: Vec<_> = fixed.iter().filter(|_| !confirms).filter(agrees).cloned().collect();
         let draft = study.draft_with(&fixed);
         let mut open = OpenProposal {
-            only_with_verdict: draft.enqueued && !in_study,
+            waits_in,
             draft,
             revision,
             study,
@@ -106,7 +115,7 @@ impl OpenProposal {
 
     /// Returns the number of the waiting trial of the study that this proposal proposes; none if it does not wait there.
     pub fn waits_as(&self) -> Option<u32> {
-        (self.draft.enqueued && !self.only_with_verdict).then_some(self.number())
+        (self.draft.enqueued && self.waits_in == WaitsIn::Study).then_some(self.number())
     }
 
     /// Whether the waiting trial of `study` that it proposes has another point by now; false if it does not wait there.
@@ -161,7 +170,7 @@ impl OpenProposal {
             draft: self.draft.clone(),
             overrides: changed.iter().map(|(name, value)| (name.clone(), *value)).collect(),
             fixed: self.fixed.iter().filter(|(name, _)| !changed.contains_key(name)).cloned().collect(),
-            only_with_verdict: self.only_with_verdict,
+            waits_in: self.waits_in,
         }
     }
 

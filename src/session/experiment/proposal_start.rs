@@ -4,7 +4,7 @@ use super::attributes::{self, BeganAttributes, JudgedAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
 use super::judging::value_of;
-use super::open_proposal::{ApprovedProposal, OpenProposal, model_insight};
+use super::open_proposal::{ApprovedProposal, OpenProposal, WaitsIn, model_insight};
 use super::plan::{RequestRefusal, not_now};
 use super::queue_changes::queued_points;
 use super::search::SearchSettings;
@@ -35,10 +35,12 @@ impl Experiment {
             match self.confirmation.next(&study) {
                 NextRepeat::Repeat(first) if !waits => {
                     study.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
+        let mut waits_in = if self.next_in_study().is_some() { WaitsIn::Study } else { WaitsIn::Verdict };
                 }
                 NextRepeat::Over(conclusion, message) => {
                     if self.confirmation.conclude(conclusion) {
                         self.log(message.clone());
+                    waits_in = WaitsIn::Confirmation;
                         self.concluded = Some(message);
                     }
                 }
@@ -62,9 +64,8 @@ impl Experiment {
             return Ok(());
         }
         let fixed: Vec<_> = self.search.fixed(study.trials()).into_iter().map(|(n, fixed)| (n, fixed.value)).collect();
-        let in_study = self.next_in_study().is_some();
         let revision = self.next_revision();
-        let mut open = OpenProposal::new(study, in_study, &fixed, &self.plan.control.gains(), revision);
+        let mut open = OpenProposal::new(study, waits_in, &fixed, &self.plan.control.gains(), revision);
         self.restore_changes(&mut open)?;
         let number = open.number();
         if open.lacks_prior() {
@@ -165,11 +166,11 @@ impl Experiment {
     /// commit. Returns its number.
     pub fn begin(&mut self, approved: ApprovedProposal, skipped: Option<String>) -> Result<u32, RequestRefusal> {
         let beyond_budget = approved.is_beyond_budget();
-        let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, only_with_verdict } = approved;
+        let ApprovedProposal { proposal, origin, mut draft, overrides, fixed, waits_in } = approved;
         let mut queued = self.report_verdict()?;
-        if only_with_verdict {
+        if draft.enqueued && waits_in != WaitsIn::Study {
             // The study does not have the queued trial yet, and another program may have taken its number.
-            if queued.is_none() {
+            if queued.is_none() && waits_in == WaitsIn::Confirmation {
                 queued = confirmation::queue_repeat(&mut self.study, &draft.point(), &origin.attributes())?;
             }
             let Some(number) = queued else {

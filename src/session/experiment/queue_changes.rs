@@ -23,12 +23,13 @@ impl Experiment {
     /// Removes a queued point: its trial becomes void, which the sampler does not see, and it never runs.
     /// Refused during a trial, for a trial that is not queued, and for a repeat of a running confirmation of the best.
     pub fn remove_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
-        self.must_be_queued(trial)?;
+        must_be_queued(&self.queue_with_rerun()?, trial)?;
+        self.queue_rerun()?;
         let proposed = self.is_next(trial);
-        if !self.end_queued(trial)? {
-            return not_now(format!("trial {trial} has just begun elsewhere"));
-        }
-        self.propose_after_change(proposed)
+        let removed = self.end_queued(trial)?;
+        // Also after a refusal: the re-run of the last verdict is in the study now.
+        self.propose_after_change(removed && proposed)?;
+        if removed { Ok(()) } else { not_now(format!("trial {trial} has just begun elsewhere")) }
     }
 
     /// Removes the queued repeats that confirm the best. One that has just begun elsewhere runs.
@@ -55,19 +56,22 @@ impl Experiment {
     /// Refused during a trial, for a trial that is not queued, at the ends of the queue, and for a repeat of a running
     /// confirmation of the best.
     pub fn move_queued(&mut self, trial: u32, earlier: bool) -> Result<QueuePlace, RequestRefusal> {
-        self.must_be_queued(trial)?;
-        let waiting: Vec<u32> = self.study.waiting().map(|trial| trial.number).collect();
+        let study = self.queue_with_rerun()?;
+        must_be_queued(&study, trial)?;
+        let waiting: Vec<u32> = study.waiting().map(|trial| trial.number).collect();
         let place = waiting.iter().position(|number| *number == trial);
         let other = place.and_then(|place| if earlier { place.checked_sub(1) } else { Some(place + 1) });
         let Some(&other) = other.and_then(|other| waiting.get(other)) else {
             return not_now(format!("trial {trial} is the {} of the queue", if earlier { "first" } else { "last" }));
         };
-        self.must_be_queued(other)?;
+        must_be_queued(&study, other)?;
+        self.queue_rerun()?;
         let proposed = self.is_next(trial) || self.is_next(other);
-        if !self.study.exchange_waiting(trial, other)? {
+        let moved = self.study.exchange_waiting(trial, other)?;
+        self.propose_after_change(moved && proposed)?;
+        if !moved {
             return not_now(format!("trial {trial} or {other} has just begun elsewhere"));
         }
-        self.propose_after_change(proposed)?;
         let queue = queued_points(&self.study);
         let place = queue.iter().position(|point| point.trial == other).unwrap_or(0);
         let point = queue.get(place).cloned().unwrap_or_default();
@@ -100,7 +104,8 @@ impl Experiment {
         self.study.waiting().map(|trial| trial.number).find(|number| *number >= first_after)
     }
 
-    /// Queues the re-run of the last verdict, which is final then: what changes the queue must see it in its place.
+    /// Queues the re-run of the last verdict, which is final then: what changes the queue must see it in its place. Called when no
+    /// refusal of the request is left; a new proposal must follow.
     pub(super) fn queue_rerun(&mut self) -> Result<(), RequestRefusal> {
         if self.pending_verdict.as_ref().is_some_and(|pending| pending.rerun.is_some()) {
             self.report_verdict()?;
@@ -108,18 +113,24 @@ impl Experiment {
         Ok(())
     }
 
-    fn must_be_queued(&mut self, trial: u32) -> Result<(), RequestRefusal> {
+    /// Returns a copy of the study in whose queue the re-run of the last verdict has its place. The verdict can still be undone.
+    /// Refused during a trial.
+    fn queue_with_rerun(&mut self) -> Result<Study, RequestRefusal> {
         self.must_be_idle()?;
-        self.queue_rerun()?;
         self.study.refresh()?;
-        let Some(queued) = self.study.waiting().find(|waiting| waiting.number == trial) else {
-            return not_now(format!("trial {trial} is not in the queue"));
-        };
-        if attributes::confirms(queued) && confirmation::running(&self.study).is_some() {
-            return not_now(format!("trial {trial} confirms the best; end the repeats instead"));
-        }
-        Ok(())
+        Ok(self.study_with_verdict()?)
     }
+}
+
+/// Refuses a trial that does not wait in `study`, and a repeat of a running confirmation of the best.
+fn must_be_queued(study: &Study, trial: u32) -> Result<(), RequestRefusal> {
+    let Some(queued) = study.waiting().find(|waiting| waiting.number == trial) else {
+        return not_now(format!("trial {trial} is not in the queue"));
+    };
+    if attributes::confirms(queued) && confirmation::running(study).is_some() {
+        return not_now(format!("trial {trial} confirms the best; end the repeats instead"));
+    }
+    Ok(())
 }
 
 /// Returns the queue of `study`, the next point first.

@@ -199,8 +199,10 @@ impl Experiment {
     fn queue(&mut self, parameters: &[(String, f64)], origin: &Origin) -> Result<Option<u32>, RequestRefusal> {
         self.must_be_idle()?;
         self.queue_rerun()?;
-        self.study.enqueue(parameters, &origin.attributes())?;
+        let queued = self.study.enqueue(parameters, &origin.attributes());
+        // Also after an error: the re-run of the last verdict is in the study now.
         self.propose()?;
+        queued?;
         let last = self.study.waiting().last().map(|trial| trial.number);
         Ok(self.proposal().map(|proposal| proposal.trial).filter(|trial| Some(*trial) == last))
     }
