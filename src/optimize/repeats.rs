@@ -93,6 +93,12 @@ fn same(a: &[(String, f64)], b: &[(String, f64)]) -> bool {
     let has = |(name, value): &(String, f64)| value_of(b, name).map(f64::to_bits) == Some(value.to_bits());
     a.len() == b.len() && a.iter().all(has)
 }
+/// Whether two trials are repeats of one point, whatever their states: equal parameters and gains.
+pub fn is_repeat(one: &Trial, other: &Trial) -> bool {
+    let (gains, others) = (one.user_attributes.get(GAINS), other.user_attributes.get(GAINS));
+    same(&one.parameters, &other.parameters) && gains == others
+}
+
 
 /// The trials that were better than all before them, in order; the last is the best, the earliest among equals. `trials`:
 /// candidates in the order of their numbers, each with its number and its own value; `mean`: value of the repeated point

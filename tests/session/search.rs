@@ -1091,3 +1091,34 @@ fn a_point_whose_removal_was_cut_off_is_queued_again_after_an_interruption() {
     let proposal = experiment.proposal().unwrap();
     assert_eq!((proposal.parent, value(&experiment, "Fx")), (Some(0), 77.0));
 }
+
+/// Regression: the void first trial of a contender left its point out of the comparison although its repeats stand, and a worse
+/// point led with full confidence.
+#[test]
+fn a_contender_whose_first_trial_becomes_void_is_compared_by_its_repeats() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let run_to = |experiment: &mut Experiment, value: f64| {
+        let spec = approve(experiment);
+        experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, value), 2);
+        experiment.judge(Verdict::Accept, false).unwrap();
+    };
+    for value in [0.9, 0.5, 0.3] {
+        run_to(&mut experiment, value);
+    }
+    experiment.confirm_best(20).unwrap();
+    let mut noise = 0.0;
+    while let Some(parent) =
+        experiment.proposal().filter(|p| p.source == ProposalSource::Confirm).and_then(|p| p.parent)
+    {
+        noise += 0.001;
+        run_to(&mut experiment, [0.9, 0.5, 0.3][parent as usize] + noise);
+    }
+    experiment.close().unwrap();
+    experiment.change_verdict(0, Verdict::Void, "wrong battery").unwrap();
+    let words = confirmation_in_words(&judged(&study_in(folder.path())).unwrap(), 0.95).unwrap();
+    let best = experiment.best().unwrap();
+    assert!(best.value.unwrap() > 0.8 && best.trial > 0, "{best:?}");
+    assert!(words.starts_with(&format!("the point of trial {} leads", best.trial)), "{words}");
+    assert!(words.contains("mean 0.90"), "{words}");
+}

@@ -7,7 +7,9 @@ use serde_json::Value;
 use super::attributes;
 use super::study_attributes::{Conclusion, RunningConfirmation, StudyAttributes};
 use crate::optimize::ask::Direction;
-use crate::optimize::repeats::{self, Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, points, rank};
+use crate::optimize::repeats::{
+    self, Confirmation, LEAST_REPEATS, RepeatedPoint, confirm, contenders, is_repeat, points, rank,
+};
 use crate::optimize::study::{Study, StudyError};
 use crate::optimize::trial::{Trial, TrialState};
 use crate::trial::PointRecord;
@@ -154,7 +156,7 @@ impl BestConfirmation {
             .filter(|lead| lead.confidence > NO_CONFIDENCE)
             .map(|lead| (compared[lead.point].trials[0], lead.confidence));
         let record = |point: RepeatedPoint| {
-            let contender = trials.iter().any(|first| point.trials.contains(first));
+            let contender = trials.iter().any(|first| is_of(&point, *first, study));
             (point.repeats() > 1 || contender).then(|| PointRecord {
                 without_fall: point.without_fall as u32,
                 mean: point.mean(),
@@ -272,10 +274,17 @@ impl RunningConfirmation {
     }
 }
 
-/// Returns the compared points; a point whose trials do not count any more is left out.
+/// Returns the compared points; a point of which no trial counts any more is left out.
 fn compared(first_trials: &[u32], study: &Study) -> Vec<RepeatedPoint> {
     let points = points(study.trials());
-    first_trials.iter().filter_map(|first| points.iter().find(|point| point.trials.contains(first)).cloned()).collect()
+    let compared = first_trials.iter().filter_map(|first| points.iter().find(|point| is_of(point, *first, study)));
+    compared.cloned().collect()
+}
+
+/// Whether `point` is that of the trial `first`, which may be void by now.
+fn is_of(point: &RepeatedPoint, first: u32, study: &Study) -> bool {
+    let trials = point.trials.first().map(|trial| (study.trial(*trial), study.trial(first)));
+    matches!(trials, Some((Ok(of_point), Ok(first))) if is_repeat(of_point, first))
 }
 
 /// Confidence of a comparison that had too few jumps.
