@@ -132,9 +132,18 @@ impl Trial {
         self.parameters.iter().position(|(n, _)| n == name).map(|i| &self.distributions[i])
     }
 
-    /// Given parameters: of an enqueued trial, or overridden by the operator.
+    /// Given parameters: of an enqueued trial, or overridden by the operator. A value of another program that is not a finite number
+    /// is none.
     pub fn fixed(&self) -> Vec<(String, f64)> {
-        self.system_attributes.get(FIXED_PARAMS).map(numbers_of).unwrap_or_default()
+        let given = self.system_attributes.get(FIXED_PARAMS).map(numbers_of).unwrap_or_default();
+        given.into_iter().filter(|(_, value)| value.is_finite()).collect()
+    }
+
+    /// Parameters that another program has given without a finite number, with their values as it wrote them.
+    pub fn given_without_number(&self) -> impl Iterator<Item = (&str, &Value)> {
+        let given = self.system_attributes.get(FIXED_PARAMS).and_then(Value::as_object).into_iter().flatten();
+        let is_number = |value: &Value| number_of(value).is_some_and(f64::is_finite);
+        given.filter(move |(_, value)| !is_number(value)).map(|(name, value)| (name.as_str(), value))
     }
 
     /// Whether the robot fell: attribute `verdict` is `fall`.

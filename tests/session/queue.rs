@@ -3,6 +3,7 @@
 use crate::support;
 use std::path::Path;
 
+use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::Experiment;
 use quadfrog::telemetry::TrialEnd;
 use quadfrog::trial::{ProposalSource, Verdict};
@@ -74,4 +75,48 @@ fn a_refused_change_of_the_queue_doubles_no_repeat_of_the_best() {
     assert_eq!(of_voided, [rerun]);
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Confirm);
     assert_eq!(study_in(folder.path()).waiting().count(), 0, "the next repeat is queued with its approval");
+}
+
+/// Appends a point that another program has queued, with these parameters as JSON of Python.
+fn queue_elsewhere(folder: &Path, parameters: &str) {
+    let path = folder.join("study.log");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let line = format!(
+        r#"{{"op_code":4,"worker_id":"py","study_id":0,"datetime_start":null,"state":4,"value":null,"values":null,"distributions":{{}},"params":{{}},"user_attrs":{{}},"system_attrs":{{"fixed_params":{parameters}}},"intermediate_values":{{}}}}"#
+    );
+    std::fs::write(&path, text + &line + "\n").unwrap();
+}
+
+/// Regression: a queued NaN, which is not equal to itself, could be neither begun nor skipped nor removed: a study without a person
+/// never ended.
+#[test]
+fn a_queued_value_that_is_no_number_is_proposed_by_the_sampler() {
+    for approved in [true, false] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = open(folder.path());
+        accept(&mut experiment);
+        experiment.close().unwrap();
+        queue_elsewhere(folder.path(), r#"{"f0":NaN,"Fx":61.0,"Fz":Infinity}"#);
+        experiment.refresh().unwrap();
+        let proposal = experiment.proposal().unwrap();
+        assert_eq!((proposal.trial, proposal.source), (1, ProposalSource::Queued));
+        assert_eq!(experiment.refusal(), None);
+        let revision = proposal.revision;
+        experiment.refresh().unwrap();
+        assert_eq!(experiment.proposal().unwrap().revision, revision, "the point has not changed");
+        let told = experiment.take_records().into_iter().any(|record| match record {
+            Record::Log(log) => log.message.contains("trial 1 was queued with f0 = NaN, Fz = Infinity"),
+            _ => false,
+        });
+        assert!(told, "the operator sees that the values were not used");
+        match approved {
+            true => {
+                let spec = accept(&mut experiment);
+                assert_eq!((spec.trial, spec.jump.fx_n), (1, 61.0));
+                assert!(spec.jump.f0_hz.is_finite() && spec.jump.fz_n.is_finite(), "{spec:?}");
+            }
+            false => experiment.skip(proposal.trial, revision).unwrap(),
+        }
+        assert_eq!(experiment.proposal().unwrap().trial, 2);
+    }
 }

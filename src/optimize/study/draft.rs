@@ -70,7 +70,8 @@ impl TrialDraft {
 
     /// Whether `trial` was queued with the point of this draft: another program may have exchanged points of the queue.
     pub fn is_of(&self, trial: &Trial) -> bool {
-        trial.fixed() == self.queued
+        let bits = |(name, value): &(String, f64)| (name.clone(), value.to_bits());
+        trial.fixed().iter().map(bits).eq(self.queued.iter().map(bits))
     }
 }
 

@@ -1,5 +1,9 @@
 //! The next proposal, and its start as a running trial.
 
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
 use super::attributes::{self, BeganAttributes, JudgedAttributes, Origin};
 use super::confirmation::{self, NextRepeat};
 use super::envelope;
@@ -31,16 +35,16 @@ impl Experiment {
         let mut study = self.study_with_verdict()?;
         // A point that was queued runs before a repeat, but does not delay the result of the last one.
         let waits = study.waiting().next().is_some();
+        let mut waits_in = if self.next_in_study().is_some() { WaitsIn::Study } else { WaitsIn::Verdict };
         if !study.waiting().any(attributes::confirms) {
             match self.confirmation.next(&study) {
                 NextRepeat::Repeat(first) if !waits => {
                     study.enqueue(&first.parameters, &Origin::confirming(&first).attributes())?;
-        let mut waits_in = if self.next_in_study().is_some() { WaitsIn::Study } else { WaitsIn::Verdict };
+                    waits_in = WaitsIn::Confirmation;
                 }
                 NextRepeat::Over(conclusion, message) => {
                     if self.confirmation.conclude(conclusion) {
                         self.log(message.clone());
-                    waits_in = WaitsIn::Confirmation;
                         self.concluded = Some(message);
                     }
                 }
@@ -79,10 +83,25 @@ impl Experiment {
         if returns && changed {
             self.log(format!("kept from before: {}", self.overrides_in_words()));
         }
+        if let Some(ignored) = self.study.trial(number).ok().and_then(|trial| self.given_without_number(trial)) {
+            self.warn(format!(
+                "trial {number} was queued with {ignored}, which is no finite number: the sampler proposes it"
+            ));
+        }
         if let Some(refusal) = self.refusal() {
             self.log(format!("trial {number} cannot run as it was queued: {refusal}"));
         }
         Ok(())
+    }
+
+    /// Returns the values of a waiting trial that are no finite numbers, in words; none without one.
+    fn given_without_number(&self, trial: &Trial) -> Option<String> {
+        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let given: BTreeMap<&str, &Value> = trial.given_without_number().collect();
+        let names = self.plan.parameters.iter().map(|parameter| parameter.name.as_str());
+        let words = names.filter_map(|name| Some(format!("{name} = {}", text(given.get(name)?))));
+        let words: Vec<String> = words.collect();
+        (trial.state == TrialState::Waiting && !words.is_empty()).then(|| words.join(", "))
     }
 
     /// Has `study` draw its points where the next trial may jump.
