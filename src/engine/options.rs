@@ -146,6 +146,10 @@ pub enum EngineError {
     #[error("--trials {budget}: {counted} trials of this study count already; give that number or more, or omit it")]
     BudgetBelowCounted { budget: u32, counted: u32 },
     #[error(transparent)]
+    #[error(
+        "{study}: its values are in {stored}, those of this session would be in {asked}, and the two cannot be compared. Set `rate` in [tasks.{task}] of control.toml as the study has it, or begin a new study"
+    )]
+    OtherUnit { study: String, task: &'static str, stored: String, asked: &'static str },
     Prior(#[from] EnsembleError),
     #[error(
         "the sampler sim cannot use its prior: {0}. Choose another sampler, or other bounds or ranges of prior.toml"

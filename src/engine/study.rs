@@ -95,7 +95,7 @@ fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, Eng
 /// configuration.
 ///
 /// # Errors
-/// When the study cannot be read, or is of another task.
+/// When the study cannot be read, or is of another task or another unit of the objective.
 pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = space_of(&parameters)?;
@@ -122,6 +122,7 @@ pub fn open_study(options: &Options, durability: Durability) -> Result<Study, En
             durability,
         },
     )?;
+    require_unit(options, &StudyAttributes::of(study.attributes()))?;
     if let Some(prior) = &options.prior {
         study.use_prior(Arc::clone(prior));
     }
@@ -146,16 +147,18 @@ fn made_on(attributes: &StudyAttributes) -> &str {
 }
 
 /// Refuses to continue a study that was made or continued on another backend, or on hardware on another robot, unless the
-/// options accept it: its points and its verdicts are those of another machine.
+/// options accept it: its points and its verdicts are those of another machine. Refuses a study with another unit of the objective
+/// in any case.
 ///
 /// # Errors
 /// When it is one, or the study cannot be read.
 pub fn check_backend(options: &Options) -> Result<(), EngineError> {
-    if options.accept_backend_change {
-        return Ok(());
-    }
     check_stored(options, |study| {
         let attributes = StudyAttributes::of(&study.user_attributes);
+        require_unit(options, &attributes)?;
+        if options.accept_backend_change {
+            return Ok(());
+        }
         let (made, robot) = (made_on(&attributes), attributes.robot.as_deref().unwrap_or("unknown robot"));
         let same_robot = options.backend == Backend::Simulator || robot == options.robot.name;
         if made == options.backend.name() && same_robot {
@@ -167,6 +170,18 @@ pub fn check_backend(options: &Options) -> Result<(), EngineError> {
             asked: format!("{} ({})", options.backend.name(), options.robot.name),
         })
     })
+}
+
+/// Refuses a study whose values have another unit than those of this session: a length and a speed cannot be compared. A study of
+/// another program has no unit.
+fn require_unit(options: &Options, study: &StudyAttributes) -> Result<(), EngineError> {
+    let Some(task) = study.task else { return Ok(()) };
+    let (stored, asked) = (study.unit.as_deref().unwrap_or(task.unit()), options.unit());
+    if stored == asked {
+        return Ok(());
+    }
+    let (study, stored) = (format!("{}, study {}", storage(options), study_name(options.task, options.seed)), stored.to_owned());
+    Err(EngineError::OtherUnit { study, task: task.name(), stored, asked })
 }
 
 /// Refuses to continue a study in which more trials count already than are asked for; for a console, before it takes a robot over.

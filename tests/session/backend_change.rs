@@ -249,3 +249,33 @@ fn a_rerun_is_held_to_the_present_bounds() {
     let refusal = experiment.approve(proposal.trial, proposal.revision).unwrap_err().to_string();
     assert!(refusal.contains("outside its bounds 150 to 250 N"), "{refusal}");
 }
+
+/// Regression: a study of lengths was continued with `rate = true`, and its sampler compared m with m/s.
+#[test]
+fn a_study_is_not_continued_with_another_unit_of_the_objective() {
+    let unit_of = |folder: &Path, toml: &str| {
+        let config = folder.join("config");
+        std::fs::create_dir_all(&config).unwrap();
+        std::fs::write(config.join("control.toml"), toml).unwrap();
+        let config = Config::load(Some(&config)).unwrap();
+        Options { config, accept_backend_change: true, ..options(folder, Backend::Simulator) }
+    };
+    let folder = tempfile::tempdir().unwrap();
+    drop(open(&options(folder.path(), Backend::Simulator)).unwrap());
+    let journal = folder.path().join("study.log");
+    let before = std::fs::read_to_string(&journal).unwrap();
+    let by_rate = unit_of(folder.path(), "[tasks.forward]\nrate = true\n");
+    for refusal in [check_backend(&by_rate).unwrap_err(), open(&by_rate).err().unwrap()] {
+        let text = refusal.to_string();
+        for part in ["forward-seed0", "in m,", "in m/s", "[tasks.forward] of control.toml", "begin a new study"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+    assert_eq!(std::fs::read_to_string(&journal).unwrap(), before);
+    // And the other way round.
+    let folder = tempfile::tempdir().unwrap();
+    drop(open(&unit_of(folder.path(), "[tasks.forward]\nrate = true\n")).unwrap());
+    drop(open(&unit_of(folder.path(), "[tasks.forward]\nrate = true\n")).expect("its own study"));
+    let refusal = open(&options(folder.path(), Backend::Simulator)).err().unwrap();
+    assert!(matches!(refusal, EngineError::OtherUnit { asked: "m", .. }), "{refusal}");
+}
