@@ -31,6 +31,8 @@ pub struct Options {
     pub folder: Option<PathBuf>,
     pub observe: bool,
     pub approve: Approval,
+    /// Name of the study that is continued, which must be there. None: the name of task and seed, made if it is not there.
+    pub study: Option<String>,
     /// The journal of a study that this engine joins as one more worker, instead of the study of the folder.
     pub join: Option<Storage>,
     /// Results of simulated robots, for the sampler `sim`; the console's session finds or makes them itself.
@@ -80,6 +82,7 @@ impl Options {
             folder: None,
             observe: false,
             approve: Approval::Each,
+            study: None,
             join: None,
             prior: None,
             guard: None,
@@ -143,13 +146,13 @@ pub enum EngineError {
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"
     )]
     OtherBackend { study: String, made: String, asked: String },
-    #[error("--trials {budget}: {counted} trials of this study count already; give that number or more, or omit it")]
-    BudgetBelowCounted { budget: u32, counted: u32 },
-    #[error(transparent)]
     #[error(
         "{study}: its values are in {stored}, those of this session would be in {asked}, and the two cannot be compared. Set `rate` in [tasks.{task}] of control.toml as the study has it, or begin a new study"
     )]
     OtherUnit { study: String, task: &'static str, stored: String, asked: &'static str },
+    #[error("--trials {budget}: {counted} trials of this study count already; give that number or more, or omit it")]
+    BudgetBelowCounted { budget: u32, counted: u32 },
+    #[error(transparent)]
     Prior(#[from] EnsembleError),
     #[error(
         "the sampler sim cannot use its prior: {0}. Choose another sampler, or other bounds or ranges of prior.toml"

@@ -18,6 +18,8 @@ use crate::trial::{ParameterInfo, Task, TrialRecord};
 #[expect(missing_docs, reason = "the types say the rest")]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredStudy {
+    /// Name in its journal, which another program may have changed; none for a study that is not made yet.
+    pub name: Option<String>,
     pub task: Task,
     pub seed: u32,
     pub robot: String,
@@ -42,7 +44,8 @@ pub fn stored_study(file: &Path) -> Result<StoredStudy, EngineError> {
 
 fn stored(study: &StudyRecord) -> Option<StoredStudy> {
     let StudyAttributes { task, seed, robot, budget, unit, .. } = StudyAttributes::of(&study.user_attributes);
-    Some(StoredStudy { task: task?, seed: seed?, robot: robot?, budget, unit })
+    let name = Some(study.name.clone());
+    Some(StoredStudy { name, task: task?, seed: seed?, robot: robot?, budget, unit })
 }
 
 /// A study of any program, opened for reading or adding trials.

@@ -95,16 +95,17 @@ fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, Eng
 /// configuration.
 ///
 /// # Errors
-/// When the study cannot be read, or is of another task or another unit of the objective.
+/// When the study cannot be read, is of another task or another unit of the objective, or is to be continued and is not there.
 pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = space_of(&parameters)?;
     let sampler = SamplerConfig { seed: options.seed, ..options.config.sampler(options.task) };
     let storage = storage(options);
+    require_study(options)?;
     let mut study = Study::open(
         storage,
         StudyOptions {
-            name: study_name(options.task, options.seed),
+            name: name(options),
             direction: Direction::Maximize,
             metric: format!("J_{} ({})", options.task.name(), options.unit()),
             space,
@@ -147,12 +148,13 @@ fn made_on(attributes: &StudyAttributes) -> &str {
 }
 
 /// Refuses to continue a study that was made or continued on another backend, or on hardware on another robot, unless the
-/// options accept it: its points and its verdicts are those of another machine. Refuses a study with another unit of the objective
-/// in any case.
+/// options accept it: its points and its verdicts are those of another machine. Refuses a study with another unit of the objective,
+/// and one that is to be continued and is not there, in any case.
 ///
 /// # Errors
 /// When it is one, or the study cannot be read.
 pub fn check_backend(options: &Options) -> Result<(), EngineError> {
+    require_study(options)?;
     check_stored(options, |study| {
         let attributes = StudyAttributes::of(&study.user_attributes);
         require_unit(options, &attributes)?;
@@ -180,8 +182,20 @@ fn require_unit(options: &Options, study: &StudyAttributes) -> Result<(), Engine
     if stored == asked {
         return Ok(());
     }
-    let (study, stored) = (format!("{}, study {}", storage(options), study_name(options.task, options.seed)), stored.to_owned());
+    let (study, stored) = (format!("{}, study {}", storage(options), name(options)), stored.to_owned());
     Err(EngineError::OtherUnit { study, task: task.name(), stored, asked })
+}
+
+/// Refuses a study that is to be continued and is not there.
+fn require_study(options: &Options) -> Result<(), EngineError> {
+    let Some(continued) = &options.study else { return Ok(()) };
+    let journal = storage(options).journal(Durability::Buffered).map_err(StudyError::from)?;
+    if journal.state().find(continued).is_some() {
+        return Ok(());
+    }
+    let living = journal.state().studies().iter().filter(|study| !study.deleted);
+    let names = living.map(|study| study.name.as_str()).collect::<Vec<_>>().join(", ");
+    Err(EngineError::NoSuchStudy { journal: storage(options).to_string(), names })
 }
 
 /// Refuses to continue a study in which more trials count already than are asked for; for a console, before it takes a robot over.
@@ -220,7 +234,7 @@ fn check_stored(
         return Ok(());
     }
     let journal = storage.journal(Durability::Buffered).map_err(StudyError::from)?;
-    let found = journal.state().find(&study_name(options.task, options.seed));
+    let found = journal.state().find(&name(options));
     found.map_or(Ok(()), |study| check(&journal.state().studies()[study]))
 }
 
@@ -232,7 +246,12 @@ fn enqueue_first(study: &mut Study, point: &[(String, f64)]) -> Result<(), Study
     study.enqueue_unless(point, &Origin::default().attributes(), &|trials| !trials.is_empty()).map(drop)
 }
 
-/// Returns the name of a study in its journal.
+/// Returns the name of the study of `options` in its journal.
+fn name(options: &Options) -> String {
+    options.study.clone().unwrap_or_else(|| study_name(options.task, options.seed))
+}
+
+/// Returns the name of a new study in its journal.
 pub fn study_name(task: Task, seed: u32) -> String {
     format!("{}-seed{seed}", task.name())
 }

@@ -550,3 +550,19 @@ fn a_kept_conclusion_of_equal_repeats_is_shown_without_a_confidence() {
     session.send("q");
     assert!(session.wait().success());
 }
+
+/// Regression: a study that another program had renamed was begun anew by `--resume`, and neither listed nor reported.
+#[test]
+fn a_study_renamed_by_another_program_is_continued_listed_and_reported() {
+    let (program, study) = study("forward");
+    let journal = Path::new(&study).join("study.log");
+    let text = fs::read_to_string(&journal).unwrap();
+    fs::write(&journal, text.replace("\"forward-seed0\"", "\"weekend\"")).unwrap();
+    let list = program.text(&["study", "list"]);
+    assert!(list.lines().nth(1).is_some_and(|line| line.contains(" 6 ")), "{list}");
+    program.text(&["report", &study, "--output", "page.html"]);
+    let trials = program.trials(&["optimize", "--resume", &study, "--trials", "8", "--json", "--record", "none"]);
+    assert_eq!(trials.len(), 2, "the six trials before count");
+    let text = fs::read_to_string(&journal).unwrap();
+    assert_eq!(text.matches("\"op_code\":0,").count(), 1, "no second study was made");
+}

@@ -4,7 +4,7 @@ use crate::support;
 use std::path::Path;
 
 use quadfrog::config::Config;
-use quadfrog::engine::{EngineError, Options, check_backend, open_experiment};
+use quadfrog::engine::{EngineError, Options, check_backend, open_experiment, stored_study};
 use quadfrog::optimize::ask::{SamplerConfig, SamplerKind};
 use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::space::{Range, Space};
@@ -278,4 +278,23 @@ fn a_study_is_not_continued_with_another_unit_of_the_objective() {
     drop(open(&unit_of(folder.path(), "[tasks.forward]\nrate = true\n")).expect("its own study"));
     let refusal = open(&options(folder.path(), Backend::Simulator)).err().unwrap();
     assert!(matches!(refusal, EngineError::OtherUnit { asked: "m", .. }), "{refusal}");
+}
+
+/// Regression: a study that another program had renamed or deleted was begun anew in its journal.
+#[test]
+fn a_study_that_is_continued_is_there_by_its_present_name() {
+    let folder = tempfile::tempdir().unwrap();
+    accept(&mut open(&options(folder.path(), Backend::Simulator)).unwrap());
+    let journal = folder.path().join("study.log");
+    let renamed = std::fs::read_to_string(&journal).unwrap().replace("\"forward-seed0\"", "\"weekend\"");
+    std::fs::write(&journal, &renamed).unwrap();
+    let stored = stored_study(&journal).unwrap();
+    assert_eq!(stored.name.as_deref(), Some("weekend"));
+    let lost = Options { study: Some("forward-seed0".into()), ..options(folder.path(), Backend::Simulator) };
+    for refusal in [check_backend(&lost).unwrap_err(), open(&lost).err().unwrap()] {
+        assert!(refusal.to_string().contains("no such study in it; its studies: weekend"), "{refusal}");
+    }
+    assert_eq!(std::fs::read_to_string(&journal).unwrap(), renamed);
+    let continued = Options { study: stored.name, ..options(folder.path(), Backend::Simulator) };
+    assert_eq!(open(&continued).unwrap().rows().count(), 1);
 }

@@ -161,7 +161,14 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         None => {
             let task = arguments.task.unwrap_or(Task::Forward);
             let seed = arguments.seed.unwrap_or(config.optimize.sampler.seed);
-            SelectedStudy { task, seed, folder: arguments.study.new_folder(task, seed), new: true, budget: None }
+            SelectedStudy {
+                name: None,
+                task,
+                seed,
+                folder: arguments.study.new_folder(task, seed),
+                new: true,
+                budget: None,
+            }
         }
     };
     let console = console.with_robot(RobotFacts::new(robot.clone(), &config, backend, selected.seed.into()));
@@ -172,6 +179,7 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
         folder: (!arguments.observe).then(|| selected.folder.clone()),
+        study: selected.name.clone().filter(|_| !arguments.observe),
         observe: arguments.observe,
         accept_backend_change: arguments.accept_backend_change,
         approve: arguments.approve,

@@ -15,6 +15,8 @@ use super::output_file::is_of_place;
 /// A study to run.
 #[derive(Clone)]
 pub struct SelectedStudy {
+    /// Its name in its journal; none for a new study.
+    pub name: Option<String>,
     pub task: Task,
     pub seed: u32,
     /// Its folder, which exists if the study is continued.
@@ -99,7 +101,7 @@ pub fn study_to_join(
         [] => {
             if let (Some(task), Some(seed)) = (task, seed) {
                 notice!("a new study of {} seed {seed} is made in {storage}", task.name());
-                return Ok(StoredStudy { task, seed, robot: robot.name.clone(), budget: None, unit: None });
+                return Ok(StoredStudy { name: None, task, seed, robot: robot.name.clone(), budget: None, unit: None });
             }
             let found = match (exists, all.as_slice()) {
                 (false, _) => "there is no such journal".to_owned(),
@@ -157,6 +159,7 @@ pub fn study_to_continue(
         return refuse(option, format!("the {}", stored.robot), format!("give --model {}", stored.robot));
     }
     Ok(SelectedStudy {
+        name: stored.name,
         task: stored.task,
         seed: stored.seed,
         folder: folder.to_owned(),

@@ -143,10 +143,11 @@ fn workers(
     }
     let task = arguments.task.first().copied();
     let seed = arguments.only_seed(SEVERAL)?;
-    let StoredStudy { task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
+    let StoredStudy { name: stored, task, seed, budget, .. } = study_to_join(storage, task, seed, robot)?;
     let name = arguments.study.new_folder(task, seed);
     let folder = |worker| PathBuf::from(format!("{}-joined-{worker}", name.display()));
-    let worker = |worker: u16| SelectedStudy { task, seed, folder: folder(worker), new: true, budget };
+    let worker =
+        |worker: u16| SelectedStudy { name: stored.clone(), task, seed, folder: folder(worker), new: true, budget };
     Ok((0..arguments.jobs.unwrap_or(1)).map(worker).collect())
 }
 
@@ -165,7 +166,7 @@ fn select(
     let pairs = tasks.iter().flat_map(|task| seeds.iter().map(|seed| (*task, *seed)));
     let new = |(task, seed)| {
         let folder = arguments.study.new_folder(task, seed);
-        SelectedStudy { task, seed, folder, new: true, budget: None }
+        SelectedStudy { name: None, task, seed, folder, new: true, budget: None }
     };
     Ok(pairs.map(new).collect())
 }
@@ -210,6 +211,7 @@ fn run_one(
         seed: study.seed,
         trials: arguments.study.trials.or(study.budget),
         folder: Some(study.folder.clone()),
+        study: study.name.clone(),
         approve: Approval::Auto,
         join: join.cloned(),
         accept_backend_change: arguments.accept_backend_change,

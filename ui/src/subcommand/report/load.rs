@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files, study_name};
+use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -52,7 +52,7 @@ fn of_storage(storage: &Storage) -> Result<Vec<ReportedStudy>, Failure> {
     let ours = if exists { stored_studies(storage)? } else { Vec::new() };
     let mut opened: Vec<Opened> = Vec::new();
     for study in &ours {
-        opened.push(open_stored(storage, Some(&study_name(study.task, study.seed)), &config)?);
+        opened.push(open_stored(storage, study.name.as_deref(), &config)?);
     }
     if opened.is_empty() {
         opened.push(open_stored(storage, None, &config)?);

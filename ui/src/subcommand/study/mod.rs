@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::{notice, output};
 use clap::{Args, Subcommand};
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, running_session, stored_studies, study_files, study_name};
+use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, running_session, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::report::columns::TableFormat;
@@ -148,8 +148,7 @@ fn list(folder: &Path) -> Result<(), Failure> {
 }
 
 fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
-    let name = Some(study_name(stored.task, stored.seed));
-    let opened = StudySelector { place: file.display().to_string(), name }.open()?;
+    let opened = StudySelector { place: file.display().to_string(), name: stored.name.clone() }.open()?;
     let all = opened.rows();
     let ran = all.iter().filter(|row| !row.was_not_run()).count();
     let counted = || all.iter().filter(|row| row.counts());
