@@ -3,6 +3,7 @@
 use crate::support as experiment;
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::time::Duration;
 
 use experiment::{plan, skip, study, study_in, ticks, without_journal};
 use quadfrog::optimize::study::Storage;
@@ -199,4 +200,24 @@ fn a_single_rollout_is_as_before() {
     let spec = judged(&mut one, TrialEnd::Settled, 0.6, Verdict::Accept);
     assert_eq!((row(&one, 0).repeats.len(), row(&one, 0).cause.as_str()), (0, "landed and settled"));
     assert_eq!(roll(&mut three(), TrialEnd::Settled, 0.6).seed, spec.seed);
+}
+
+/// Regression: news of a running trial was a greater number of attributes; the second and later rollouts replace the attribute of
+/// the first, and another worker declared the trial abandoned although its rollouts were judged in time.
+#[test]
+fn a_worker_whose_rollouts_are_judged_in_time_is_alive() {
+    let folder = tempfile::tempdir().unwrap();
+    let worker = || {
+        let mut study = study_in(folder.path());
+        let worker = study.join().unwrap();
+        Experiment::open(ExperimentPlan { worker, abandoned: Duration::from_secs(2), ..plan_of(10) }, study).unwrap()
+    };
+    let (mut first, mut second) = (worker(), worker());
+    for _ in 0..7 {
+        judged(&mut first, TrialEnd::Settled, 0.5, Verdict::Accept);
+        second.refresh().unwrap();
+        std::thread::sleep(Duration::from_millis(500));
+        second.refresh().unwrap();
+        assert!(second.others_run(), "the first worker has judged a rollout half a second ago");
+    }
 }

@@ -4,6 +4,8 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
 use crate::optimize::trial::{Trial, TrialState};
 
 /// Times at which this session has seen the last news of running trials.
@@ -11,8 +13,8 @@ use crate::optimize::trial::{Trial, TrialState};
 pub struct Liveness {
     /// Time without news after which a running trial counts as abandoned.
     abandoned: Duration,
-    /// By number: time of the last news, and the number of attributes then.
-    last_news: BTreeMap<u32, (Instant, usize)>,
+    /// By number: time of the last news, and the user attributes then.
+    last_news: BTreeMap<u32, (Instant, BTreeMap<String, Value>)>,
 }
 
 impl Liveness {
@@ -23,14 +25,13 @@ impl Liveness {
     /// Records the present state of the trials; to be called whenever the study was read.
     pub fn update(&mut self, trials: &[Trial]) {
         let now = Instant::now();
-        let before = std::mem::take(&mut self.last_news);
+        let mut before = std::mem::take(&mut self.last_news);
         let running = trials.iter().filter(|trial| trial.state == TrialState::Running);
         self.last_news = running
             .map(|trial| {
-                // A judgement is news: it adds attributes.
-                let attributes = trial.user_attributes.len();
-                let since = before.get(&trial.number).filter(|(_, had)| *had == attributes);
-                (trial.number, since.copied().unwrap_or((now, attributes)))
+                // A judgement is news: it adds attributes, or replaces those of the rollout before.
+                let since = before.remove(&trial.number).filter(|(_, had)| *had == trial.user_attributes);
+                (trial.number, since.unwrap_or_else(|| (now, trial.user_attributes.clone())))
             })
             .collect();
     }
