@@ -823,3 +823,35 @@ fn an_interrupted_study_runs_the_trials_of_an_unbroken_one_with_the_same_seeds()
     distinct.dedup();
     assert_eq!(distinct.len(), 8, "each trial has noise of its own");
 }
+
+/// Regression: the verdict was written before its value, and a judgement that was cut off between them counted as a fall with the
+/// distance that was measured.
+#[test]
+fn a_judgement_that_was_cut_off_is_a_fall_of_value_zero_or_waits_for_its_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    run(&mut experiment, TrialEnd::Settled);
+    experiment.keep_measurement().unwrap();
+    let journal = folder.path().join("study.log");
+    let before = std::fs::read_to_string(&journal).unwrap();
+    experiment.judge(Verdict::Fall, false).unwrap();
+    drop(experiment);
+    let judged = std::fs::read_to_string(&journal).unwrap();
+    let added: Vec<&str> = judged[before.len()..].split_inclusive('\n').collect();
+    assert!(added.len() > 3);
+    for lines in 1..=added.len() {
+        std::fs::write(&journal, before.clone() + &added[..lines].concat()).unwrap();
+        let experiment = open(folder.path());
+        let row = experiment.row(0).unwrap();
+        let expected = match experiment.stage() {
+            ExperimentStage::Review => (None, Some(far_of(row))),
+            _ => (Some(Verdict::Fall), Some(0.0)),
+        };
+        assert_eq!((row.verdict, row.value), expected, "after {lines} of {} lines", added.len());
+    }
+}
+
+/// Returns the measured length of the jump of a row, m.
+fn far_of(row: &TrialRecord) -> f64 {
+    row.measured.as_ref().unwrap().dx_m
+}

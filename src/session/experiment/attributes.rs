@@ -161,11 +161,9 @@ pub struct RepeatsAttribute<'a> {
 }
 
 /// Attributes that are written when a trial was measured, and when it is judged; before the verdict, and after it was taken back,
-/// the verdict and its origin are null.
+/// the verdict and its origin are null. The verdict is the last: a judgement that was cut off has none.
 #[derive(Debug, Serialize)]
 pub struct JudgedAttributes<'a> {
-    verdict: Option<Verdict>,
-    judged_by: Option<JudgedBy>,
     suggested: Option<Verdict>,
     cause: &'a str,
     value: Option<f64>,
@@ -176,6 +174,8 @@ pub struct JudgedAttributes<'a> {
     measured: Option<&'a MeasuredJump>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     repeats: &'a [RepeatRecord],
+    judged_by: Option<JudgedBy>,
+    verdict: Option<Verdict>,
 }
 
 impl JudgedAttributes<'_> {
@@ -183,8 +183,6 @@ impl JudgedAttributes<'_> {
     pub fn of(row: &TrialRecord, rerun: bool) -> JudgedAttributes<'_> {
         let TrialRecord { verdict, judged_by, suggested, cause, value, hand_value, measured, repeats, .. } = row;
         JudgedAttributes {
-            verdict: *verdict,
-            judged_by: *judged_by,
             suggested: *suggested,
             cause,
             value: *value,
@@ -192,6 +190,8 @@ impl JudgedAttributes<'_> {
             rerun,
             measured: measured.as_ref(),
             repeats,
+            judged_by: *judged_by,
+            verdict: *verdict,
         }
     }
 }
@@ -262,7 +262,9 @@ impl TrialAttributes {
     pub fn outcome(&self) -> Option<Outcome> {
         match self.verdict.filter(|_| self.suggested.is_some())? {
             Verdict::Void => Some(Outcome::Fail),
-            Verdict::Accept | Verdict::Fall => self.value.map(Outcome::Complete),
+            // A judgement that was cut off may have the value that was measured.
+            Verdict::Fall => Some(Outcome::Complete(0.0)),
+            Verdict::Accept => self.value.map(Outcome::Complete),
         }
     }
 }
