@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::program::{Program, assert_shows, counted_trials, hold};
+use crate::program::{Program, assert_shows, counted_trials, hold, with_small_files};
 use crate::pty::Session;
 use crate::skip::skip;
 use serde_json::Value;
@@ -565,4 +565,35 @@ fn a_study_renamed_by_another_program_is_continued_listed_and_reported() {
     assert_eq!(trials.len(), 2, "the six trials before count");
     let text = fs::read_to_string(&journal).unwrap();
     assert_eq!(text.matches("\"op_code\":0,").count(), 1, "no second study was made");
+}
+
+/// Regression: `study import --queue` dropped the gains of the points, which ran with those of the configuration.
+#[test]
+fn a_queued_row_runs_with_its_gains() {
+    let (program, study) = study("forward");
+    let table = "params_f0,params_Fx,params_Fz,user_attrs_gains,state\n1.25,66,211,\"{\"\"kp\"\": 450.0}\",WAITING\n";
+    program.write("points.csv", table);
+    program.text(&["study", "import", &study, "points.csv", "--queue"]);
+    program.text(&["optimize", "--resume", &study, "--trials", "7", "--record", "none"]);
+    let last = program.exported(&study).pop().unwrap();
+    assert_eq!((&last["params"]["Fx"], &last["user_attrs"]["gains"]["kp"]), (&66.0.into(), &450.0.into()));
+}
+
+/// Regression: on a full disk a part of the points stayed queued, and a plain import named the table as the fault, with exit status 2.
+#[test]
+fn a_table_on_a_full_disk_is_added_whole_or_not_at_all() {
+    let (program, study) = study("forward");
+    let journal = Path::new(&study).join("study.log");
+    let before = fs::read(&journal).unwrap();
+    let rows: String = (0..60).map(|i| format!("1.25,{i},211,0.5\n")).collect();
+    program.write("points.csv", &format!("params_f0,params_Fx,params_Fz,value\n{rows}"));
+    let blocks = before.len() as u32 / 512 + 4;
+    for queue in [&["--queue"][..], &[]] {
+        let arguments = [&["study", "import", &study, "points.csv"][..], queue].concat();
+        let (status, message) = with_small_files(&program, blocks, &arguments);
+        assert_eq!(status, Some(1), "{message}");
+        assert!(message.contains("study.log") && !message.contains("points.csv"), "{message}");
+        assert!(fs::read(&journal).unwrap() == before, "a part of the table stays");
+    }
+    assert!(program.text(&["study", "import", &study, "points.csv", "--queue"]).contains("60 points queued"));
 }

@@ -19,6 +19,7 @@ mod workers;
 pub use best::{ModelBest, ModelPredictions};
 pub use draft::{DRAWS, SuggestedParameter, TrialDraft};
 pub use error::StudyError;
+pub use results::WaitingPoint;
 pub use storage::Storage;
 pub use workers::worker_seed;
 

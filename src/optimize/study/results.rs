@@ -8,6 +8,9 @@ use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attr
 use crate::optimize::journal::{Applied, JournalError, Operation};
 use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange, json_object};
 
+/// Parameters and user attributes of a trial to enqueue.
+pub type WaitingPoint = (Vec<(String, f64)>, Vec<(String, Value)>);
+
 impl Study {
     /// Sets user attributes of a running or waiting trial: verdict, cause, measured terms. A finished trial is immutable
     /// ([`StudyError::State`]), see [`Study::note`].
@@ -110,6 +113,26 @@ impl Study {
         attributes: &[(String, Value)],
         done: &dyn Fn(&[Trial]) -> bool,
     ) -> Result<Option<u32>, StudyError> {
+        let create = self.queued(parameters, attributes)?;
+        let study = self.id;
+        let applied = self.journal.commit(|journal| {
+            let needed = journal.studies().get(study).is_some_and(|record| !done(&record.trials));
+            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
+        })?;
+        Ok(self.created(&applied).next())
+    }
+
+    /// Enqueues trials in this order, all or none, each with its parameters and user attributes, as [`Study::enqueue`]. Returns
+    /// their numbers.
+    pub fn enqueue_all(&mut self, points: &[WaitingPoint]) -> Result<Vec<u32>, StudyError> {
+        let creations = points.iter().map(|(parameters, attributes)| self.queued(parameters, attributes));
+        let creations = creations.collect::<Result<Vec<_>, _>>()?;
+        let applied = self.journal.commit(|_| Ok::<_, JournalError>(creations.clone()))?;
+        Ok(self.created(&applied).collect())
+    }
+
+    /// The operation that enqueues a trial.
+    fn queued(&self, parameters: &[(String, f64)], attributes: &[(String, Value)]) -> Result<Operation, StudyError> {
         self.check_parameters(parameters)?;
         let template = Trial {
             state: TrialState::Waiting,
@@ -117,13 +140,7 @@ impl Study {
             system_attributes: [(FIXED_PARAMS.to_owned(), json_object(parameters))].into(),
             ..Trial::default()
         };
-        let study = self.id;
-        let create = Operation::CreateTrial { study, started: None, template: Some(Box::new(template)) };
-        let applied = self.journal.commit(|journal| {
-            let needed = journal.studies().get(study).is_some_and(|record| !done(&record.trials));
-            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
-        })?;
-        Ok(self.created(&applied).next())
+        Ok(Operation::CreateTrial { study: self.id, started: None, template: Some(Box::new(template)) })
     }
 
     /// Sets user attributes of the study.

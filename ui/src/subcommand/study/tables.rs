@@ -7,8 +7,8 @@ use std::path::Path;
 use anyhow::Context;
 use clap::ValueEnum;
 use quadfrog::optimize::exchange::{self, TableTrial};
-use quadfrog::optimize::study::StudyError;
-use quadfrog::optimize::trial::TrialState;
+use quadfrog::optimize::study::{StudyError, WaitingPoint};
+use quadfrog::optimize::trial::{GAINS, TrialState};
 use quadfrog::report::columns::{TableFormat, TableWriter};
 use quadfrog::report::trial_columns;
 use quadfrog::session::experiment;
@@ -110,7 +110,12 @@ pub fn import(
         trials.into_iter().partition(|trial| trial.state.is_finished());
     if queue.is_none() {
         let given = finished.len();
-        let added = experiment::import(study, finished).map_err(|error| refuse(&error))?.len();
+        let added = experiment::import(study, finished).map_err(|error| match error {
+            // Not the table's: the journal cannot be read or written.
+            StudyError::Journal(_) => error.into(),
+            error => refuse(&error),
+        })?;
+        let added = added.len();
         let mut text = format!("{} imported", counted(added, "trial"));
         if given > added {
             let _ = write!(text, "; {} were there already (same parameters, value and times)", given - added);
@@ -123,10 +128,15 @@ pub fn import(
         output::text(&(text + &left_out + "\n"));
         return Ok(());
     }
-    let points: Vec<TableTrial> = finished.into_iter().chain(unfinished).filter(is_asked).collect();
-    for point in &points {
-        study.enqueue(&point.parameters, &[])?;
-    }
+    let points: Vec<WaitingPoint> =
+        finished.into_iter().chain(unfinished).filter(is_asked).map(waiting_point).collect();
+    study.enqueue_all(&points)?;
     output::text(&format!("{} queued{left_out}{then}\n", counted(points.len(), "point")));
     Ok(())
+}
+
+/// Returns the point of a row to queue: its parameters, and its gains where it has some.
+fn waiting_point(row: TableTrial) -> WaitingPoint {
+    let gains = row.attributes.get(GAINS).filter(|gains| gains.is_object()).cloned();
+    (row.parameters, gains.map(|gains| (GAINS.to_owned(), gains)).into_iter().collect())
 }
