@@ -20,10 +20,13 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Orders two objective values, the better one first.
+    /// Orders two objective values, the better one first. A NaN comes after every number: a total order, as sorting needs it.
     pub fn best_first(self, a: f64, b: f64) -> Ordering {
-        let ascending = a.partial_cmp(&b).unwrap_or(Ordering::Equal);
-        if self == Direction::Maximize { ascending.reverse() } else { ascending }
+        match a.partial_cmp(&b) {
+            Some(ascending) if self == Direction::Maximize => ascending.reverse(),
+            Some(ascending) => ascending,
+            None => a.is_nan().cmp(&b.is_nan()),
+        }
     }
 
     /// Returns a value of the objective with the sign by which larger is better, or one with that sign as the objective's.

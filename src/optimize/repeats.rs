@@ -72,10 +72,14 @@ pub fn points(trials: &[Trial]) -> Vec<RepeatedPoint> {
     }))
 }
 
-/// The points of results with equal parameters and gains, in the order of their first results.
+/// The points of results with equal parameters and gains, in the order of their first results. A result that is infinite or no
+/// number has no mean with others and is left out.
 pub fn points_of<'a, G: PartialEq>(results: impl IntoIterator<Item = RepeatResult<'a, G>>) -> Vec<RepeatedPoint> {
     let mut points: Vec<(G, RepeatedPoint)> = Vec::new();
     for RepeatResult { trial, parameters, gains, value, is_fall } in results {
+        if !value.is_finite() {
+            continue;
+        }
         let known = points.iter().position(|(g, point)| *g == gains && same(&point.parameters, parameters));
         let index = known.unwrap_or(points.len());
         if index == points.len() {
@@ -89,16 +93,16 @@ pub fn points_of<'a, G: PartialEq>(results: impl IntoIterator<Item = RepeatResul
     points.into_iter().map(|(_, point)| point).collect()
 }
 
-fn same(a: &[(String, f64)], b: &[(String, f64)]) -> bool {
-    let has = |(name, value): &(String, f64)| value_of(b, name).map(f64::to_bits) == Some(value.to_bits());
-    a.len() == b.len() && a.iter().all(has)
-}
 /// Whether two trials are repeats of one point, whatever their states: equal parameters and gains.
 pub fn is_repeat(one: &Trial, other: &Trial) -> bool {
     let (gains, others) = (one.user_attributes.get(GAINS), other.user_attributes.get(GAINS));
     same(&one.parameters, &other.parameters) && gains == others
 }
 
+fn same(a: &[(String, f64)], b: &[(String, f64)]) -> bool {
+    let has = |(name, value): &(String, f64)| value_of(b, name).map(f64::to_bits) == Some(value.to_bits());
+    a.len() == b.len() && a.iter().all(has)
+}
 
 /// The trials that were better than all before them, in order; the last is the best, the earliest among equals. `trials`:
 /// candidates in the order of their numbers, each with its number and its own value; `mean`: value of the repeated point

@@ -182,3 +182,29 @@ fn equal_contenders_use_up_the_budget_and_no_noise_is_certain() {
     assert_eq!(confirmation([0.5, 0.6, 0.4], 0.0, 60, &mut stream), (Some(1), 6));
     assert_eq!(confirm(&[], Direction::Maximize, 0.95), Confirmation::Leads(0, 1.0));
 }
+
+/// Regression: a NaN was equal to every value, which is no order: sorting points or trials with such values panicked. Points with an
+/// infinite value of either sign had the mean NaN.
+#[test]
+fn values_that_are_no_numbers_come_last_and_make_no_point() {
+    for direction in [Direction::Maximize, Direction::Minimize] {
+        assert!(direction.best_first(f64::NAN, 1.0).is_gt() && direction.best_first(1.0, f64::NAN).is_lt());
+        assert!(direction.best_first(f64::NAN, f64::NAN).is_eq() && direction.best_first(0.0, -0.0).is_eq());
+        // A fixed permutation of 200 places.
+        let value = |i: u32| match (i * 77) % 200 {
+            place if place % 3 == 0 => f64::NAN,
+            place if place % 7 == 0 => f64::INFINITY,
+            place if place % 11 == 0 => f64::NEG_INFINITY,
+            place => f64::from(place),
+        };
+        let at = |i: u32| f64::from(i % 100) / 100.0;
+        let trials: Vec<Trial> =
+            (0..200).map(|i| Trial { value: Some(value(i)), ..trial(i, [at(i), 0.5], 0.0, false) }).collect();
+        let points = contenders(&trials, direction, usize::MAX, None);
+        assert!(points.iter().all(|point| point.mean().is_finite()), "{points:?}");
+        let sorted = points.windows(2).all(|pair| direction.best_first(pair[0].mean(), pair[1].mean()).is_le());
+        assert!(sorted && points.len() > 10);
+        let split = quadfrog::optimize::tpe::split(&trials, direction);
+        assert!(split.good.iter().all(|trial| !trial.value.unwrap().is_nan()));
+    }
+}
