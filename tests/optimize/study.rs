@@ -326,3 +326,28 @@ fn a_study_of_another_kind_is_refused() {
     let space = Space::new([("Fz".into(), Range::logarithmic(200.0, 300.0))]).unwrap();
     Study::open(Storage::File(path.clone()), StudyOptions { space, ..options(0, true) }).unwrap();
 }
+
+/// Regression: a last line that is complete, and that Optuna reads, was cut out of the shared journal as a torn one where this
+/// program cannot read it: nested deeper than 128 levels, or with an integer beyond the range of a double.
+#[test]
+fn a_complete_last_line_that_cannot_be_read_stays_in_the_journal() {
+    let deep = format!("{}1{}", "[".repeat(200), "]".repeat(200));
+    let large = format!("1{}", "0".repeat(400));
+    let attribute = |value: &str| {
+        format!("{{\"op_code\": 2, \"worker_id\": \"py\", \"study_id\": 0, \"user_attr\": {{\"a\": {value}}}}}\n")
+    };
+    let unknown = "{\"op_code\": 77, \"worker_id\": \"py\"}\n".to_owned();
+    for line in [attribute(&deep), attribute(&large), unknown] {
+        let (folder, path, mut study) = with_a_trial();
+        let written = std::fs::read_to_string(&path).unwrap() + &line;
+        std::fs::write(&path, &written).unwrap();
+        let draft = study.draft();
+        let error = study.begin(&draft, &[], &[]).unwrap_err().to_string();
+        let last = written.lines().count();
+        assert!(error.contains(&format!("line {last} is complete")), "{error}");
+        assert!(error.len() < 600, "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), written);
+        assert!(!folder.path().join("study.log.torn-0").exists());
+        assert_eq!(open(&path, 0, true).trials().len(), 1, "it can still be looked at");
+    }
+}

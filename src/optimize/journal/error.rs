@@ -14,6 +14,12 @@ pub enum JournalError {
     )]
     Line { path: PathBuf, line: usize, fault: String },
     #[error(
+        "{}, line {line} is complete and cannot be read ({fault}): nothing is written after it, because another program may \
+         need it. Keep a copy, then remove or repair the line",
+        path.display()
+    )]
+    LastLine { path: PathBuf, line: usize, fault: String },
+    #[error(
         "{} is no journal of a study ({fault}); give the study's folder, its `study.log`, or another Optuna journal",
         path.display()
     )]

@@ -1,6 +1,7 @@
 //! The journal as a file shared by several programs: reading, locking, appending (`docs/journal.md`).
 
 use super::error::JournalError;
+use super::json::is_torn;
 use super::wait::{JournalWait, LongWait, WaitedFor};
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
@@ -52,6 +53,8 @@ pub struct JournalFile {
 #[derive(Default)]
 pub(super) struct UnreadTail {
     bytes: Vec<u8>,
+    /// The fault of a complete line that other programs can read: it is not removed, and nothing is appended.
+    fault: Option<String>,
 }
 
 impl JournalFile {
@@ -95,7 +98,7 @@ impl JournalFile {
         if self.offset == 0 && bytes.starts_with(SQLITE_MAGIC) {
             return Err(JournalError::Sqlite { path: self.path.clone() });
         }
-        let mut start = 0;
+        let (mut start, mut unreadable) = (0, None);
         while let Some(end) = bytes[start..].iter().position(|b| *b == b'\n').map(|i| start + i + 1) {
             let line = match end - start {
                 length if length > LONGEST_LINE => Err(too_long(length)),
@@ -103,8 +106,11 @@ impl JournalFile {
             };
             match line.and_then(|line| accept(line.trim_end_matches(['\n', '\r']))) {
                 Ok(()) => {}
-                // Writers remove an invalid last line; an invalid line before another stops every reader.
-                Err(_) if !bytes[end..].contains(&b'\n') => break,
+                // Writers remove a torn last line; an invalid line before another stops every reader.
+                Err(fault) if !bytes[end..].contains(&b'\n') => {
+                    unreadable = Some(fault).filter(|_| !is_torn(&bytes[start..end]));
+                    break;
+                }
                 // A journal whose first line is damaged is as rare as a wrong name is frequent, and nothing is to be repaired there.
                 Err(fault) if self.lines == 0 => {
                     return Err(JournalError::NoJournal { path: self.path.clone(), fault: format!("line 1: {fault}") });
@@ -120,7 +126,7 @@ impl JournalFile {
             let fault = too_long(tail.len());
             return Err(JournalError::Line { path: self.path.clone(), line: self.lines + 1, fault });
         }
-        Ok(UnreadTail { bytes: tail })
+        Ok(UnreadTail { bytes: tail, fault: unreadable })
     }
 
     /// Returns the wait for the lock.
@@ -184,6 +190,9 @@ impl JournalFile {
     /// Appends whole lines in one write, or nothing; `rest` is first moved to `<path>.torn-<n>`. Returns false, with nothing
     /// changed, if another writer has broken the lock: this program was stopped for longer than the grace time, and
     /// `rest` may be the beginning of that writer's lines.
+    ///
+    /// # Errors
+    /// If the file cannot be written, or `rest` is a complete line that this program cannot read; nothing is appended then.
     pub(super) fn append(&self, lock: &JournalLock, rest: &UnreadTail, lines: &str) -> Result<bool, JournalError> {
         let io = |e| JournalError::io("append to", &self.path, e);
         let fresh = self.offset == 0 && !self.path.exists();
@@ -191,6 +200,9 @@ impl JournalFile {
         let length = file.metadata().map_err(io)?.len();
         if length != self.offset + rest.bytes.len() as u64 || !lock.is_held() {
             return Ok(false);
+        }
+        if let Some(fault) = rest.fault.clone() {
+            return Err(JournalError::LastLine { path: self.path.clone(), line: self.lines + 1, fault });
         }
         if !rest.bytes.is_empty() {
             self.keep_aside(&rest.bytes)?;

@@ -139,6 +139,16 @@ pub fn parse_json(text: &str) -> Result<Value, String> {
         .map_err(|e| format!("not JSON: {e}"))
 }
 
+/// Whether a line is no JSON, as one that was cut off. Lines that only this program's parser refuses are JSON: those nested deeper than
+/// 128 levels, and those with a number beyond the range of a double.
+pub fn is_torn(line: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(line) else { return true };
+    let parsed = serde_json::from_str::<Value>(text).or_else(|_| serde_json::from_str(&strictly(text)));
+    // The parser gives these two reasons as text alone.
+    let limits = ["recursion limit exceeded", "number out of range"];
+    parsed.is_err_and(|fault| !limits.iter().any(|limit| fault.to_string().starts_with(limit)))
+}
+
 fn strictly(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     let mut rest = text;
