@@ -351,3 +351,29 @@ fn a_complete_last_line_that_cannot_be_read_stays_in_the_journal() {
         assert_eq!(open(&path, 0, true).trials().len(), 1, "it can still be looked at");
     }
 }
+
+/// Regression: a position in the random streams of 10^15, which no trial can have reached, was read up to there: no command that
+/// opened the study came to an end.
+#[test]
+fn an_absurd_position_in_the_random_streams_is_not_read_up_to() {
+    let (_folder, path, study) = with_a_trial();
+    let expected = study.draft().before;
+    drop(study);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let absurd = |draws: &str| {
+        format!(
+            "{{\"op_code\":4,\"worker_id\":\"x\",\"study_id\":0,\"datetime_start\":null,\"state\":3,\"value\":null,\
+             \"values\":null,\"distributions\":{{}},\"params\":{{}},\"user_attrs\":{{}},\
+             \"system_attrs\":{{\"quadfrog:draws\":{draws}}},\"intermediate_values\":{{}}}}\n"
+        )
+    };
+    for draws in
+        [r#"{"seed":0,"model":1000000000000000,"startup":0}"#, r#"{"seed":0,"model":0,"startup":18446744073709551615}"#]
+    {
+        std::fs::write(&path, text.clone() + &absurd(draws)).unwrap();
+        let (path, (answer, drafted)) = (path.clone(), std::sync::mpsc::channel());
+        std::thread::spawn(move || answer.send(open(&path, 0, true).draft().before));
+        let before = drafted.recv_timeout(Duration::from_secs(60)).expect("the study opens");
+        assert_eq!(before, expected, "{draws}");
+    }
+}

@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 /// Trial system attribute: seed and positions of the random streams after the draws of the trial.
 pub const DRAWS: &str = "quadfrog:draws";
 
+/// Most doubles that the draws of one trial take from a stream: 10000 candidates of TPE for ten parameters take 310000.
+const MOST_DRAWS: u64 = 1 << 20;
+
 /// Value of the attribute [`DRAWS`].
 #[derive(Serialize, Deserialize)]
 struct StreamPosition {
@@ -89,8 +92,8 @@ impl Study {
         let trials = self.trials();
         let waiting = trials.iter().find(|t| t.state == TrialState::Waiting);
         let given = merged(waiting.map(Trial::fixed).unwrap_or_default(), fixed);
-        let before = self.streams.draws();
-        let mut streams = self.streams.clone();
+        let mut streams = self.streams().clone();
+        let before = streams.draws();
         let space = &self.options.space;
         let ask = self.ask(&given);
         let candidate = propose(&ask, &mut streams);
@@ -172,7 +175,7 @@ impl Study {
     ) -> Result<u32, StudyError> {
         self.check_parameters(overrides)?;
         let stale = || StudyError::StaleDraft { trial: draft.number };
-        if draft.before != self.streams.draws() || draft.seed != self.options.sampler.seed {
+        if draft.before != self.streams().draws() || draft.seed != self.options.sampler.seed {
             return Err(stale());
         }
         let fixed = draft.parameters.iter().filter(|s| s.fixed).map(|s| (s.name.clone(), s.value));
@@ -213,14 +216,21 @@ impl Study {
             }
             Ok(operations)
         })?;
-        self.streams.advance_to(draws);
+        let mut streams = self.streams().clone();
+        streams.advance_to(draws);
+        self.streams = streams.into();
         self.journal.state().trial(id).map(|t| t.number).ok_or_else(|| StudyError::Gone(self.options.name.clone()))
     }
 
-    /// The farthest position in the streams of the present seed over all trials.
+    /// The farthest position in the streams of the present seed over all trials. One that the trials up to it cannot have reached
+    /// is none of this program: to read up to it would take hours.
     pub(super) fn draws_so_far(&self) -> Draws {
         let position = |t: &Trial| StreamPosition::deserialize(t.system_attributes.get(DRAWS)?).ok();
-        let own = self.trials().iter().filter_map(position).filter(|p| p.seed == self.options.sampler.seed);
+        let reachable = |t: &Trial, draws: Draws| {
+            draws.model.max(draws.startup) <= (u64::from(t.number) + 1).saturating_mul(MOST_DRAWS)
+        };
+        let seed = self.options.sampler.seed;
+        let own = self.trials().iter().filter_map(|t| position(t).filter(|p| p.seed == seed && reachable(t, p.draws)));
         own.map(|p| p.draws)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
     }

@@ -23,7 +23,7 @@ pub use results::WaitingPoint;
 pub use storage::Storage;
 pub use workers::worker_seed;
 
-use crate::optimize::ask::{Direction, SamplerConfig, Streams};
+use crate::optimize::ask::{Direction, Draws, SamplerConfig, Streams};
 use crate::optimize::journal::{
     Applied, AttributeKind, Durability, Journal, JournalError, JournalWait, Operation, StudyRecord,
 };
@@ -32,7 +32,7 @@ use crate::optimize::space::Space;
 use crate::optimize::trial::{Trial, TrialState};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Study system attribute of Optuna and its dashboard: names of the objectives.
 const METRIC_NAMES: &str = "study:metric_names";
@@ -81,7 +81,10 @@ pub struct Study {
     journal: Journal,
     id: usize,
     options: StudyOptions,
-    streams: Streams,
+    /// Position in the random streams at the opening.
+    drawn: Draws,
+    /// The streams, read up to their position when the first point is drawn: a reader of the study draws none.
+    streams: OnceLock<Streams>,
     /// Part of the search space in which points are drawn; none for the whole space.
     inside: Option<Space>,
     /// Results of simulated robots, for the sampler `sim`.
@@ -100,12 +103,26 @@ impl Study {
             })?;
         }
         let Some(id) = journal.state().find(&options.name) else { return Err(StudyError::Gone(options.name)) };
-        let streams = Streams::new(options.sampler.seed);
-        let mut study = Study { journal, id, options, streams, inside: None, prior: None };
+        let (drawn, streams) = (Draws::default(), OnceLock::new());
+        let mut study = Study { journal, id, options, drawn, streams, inside: None, prior: None };
         study.check_compatible()?;
         study.complete_exchange()?;
-        study.streams.advance_to(study.draws_so_far());
+        study.begin_streams();
         Ok(study)
+    }
+
+    /// Continues the random streams of the present seed where the trials of the study have ended.
+    fn begin_streams(&mut self) {
+        self.drawn = self.draws_so_far();
+        self.streams = OnceLock::new();
+    }
+
+    fn streams(&self) -> &Streams {
+        self.streams.get_or_init(|| {
+            let mut streams = Streams::new(self.options.sampler.seed);
+            streams.advance_to(self.drawn);
+            streams
+        })
     }
 
     /// Returns the wait for the lock of the journal's file, or for its server.
@@ -121,11 +138,12 @@ impl Study {
     /// Copies the study to memory: its changes are not stored, and its next proposal is the one that this study would make
     /// after the same changes.
     pub fn fork(&self) -> Study {
-        let (options, streams) = (self.options.clone(), self.streams.clone());
+        let (options, drawn, streams) = (self.options.clone(), self.drawn, self.streams.clone());
         Study {
             journal: self.journal.fork(),
             id: self.id,
             options,
+            drawn,
             streams,
             inside: self.inside.clone(),
             prior: self.prior.clone(),

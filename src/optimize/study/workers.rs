@@ -1,8 +1,7 @@
 //! Workers of a shared study.
 
 use super::{Study, StudyError};
-use crate::optimize::ask::Streams;
-use crate::optimize::journal::{AttributeKind, JournalError, Operation};
+use crate::optimize::journal::{AttributeKind, Operation};
 
 /// Study system attribute: number of workers that have joined.
 const WORKERS: &str = "quadfrog:workers";
@@ -20,8 +19,7 @@ impl Study {
             Ok::<_, JournalError>(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
         })?;
         self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
-        self.streams = Streams::new(self.options.sampler.seed);
-        self.streams.advance_to(self.draws_so_far());
+        self.begin_streams();
         Ok(worker)
     }
 }
