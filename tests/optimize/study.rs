@@ -377,3 +377,18 @@ fn an_absurd_position_in_the_random_streams_is_not_read_up_to() {
         assert_eq!(before, expected, "{draws}");
     }
 }
+
+/// Regression: after the largest number of a worker the next worker had number 0, that of the session with the study's folder.
+#[test]
+fn no_worker_joins_after_the_last_number() {
+    for joined in ["4294967295", "4294967296", "18446744073709551615"] {
+        let (_folder, path, study) = with_a_trial();
+        drop(study);
+        let line = format!(
+            "{{\"op_code\":3,\"worker_id\":\"x\",\"study_id\":0,\"system_attr\":{{\"quadfrog:workers\":{joined}}}}}\n"
+        );
+        std::fs::write(&path, std::fs::read_to_string(&path).unwrap() + &line).unwrap();
+        let error = open(&path, 0, true).join().unwrap_err().to_string();
+        assert!(error.contains("no worker can join") && error.contains("quadfrog:workers"), "{error}");
+    }
+}

@@ -33,6 +33,11 @@ pub enum StudyError {
     StaleDraft { trial: u32 },
     #[error("the budget of trials is used up, running trials included")]
     Full,
+    #[error(
+        "no worker can join: {joined} have joined by the study's system attribute `{attribute}`, and the largest number of a worker is {}. Set the attribute in the journal to the number of workers that have joined",
+        u32::MAX
+    )]
+    NoWorkerLeft { attribute: &'static str, joined: u64 },
     #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
     Gone(String),
 }

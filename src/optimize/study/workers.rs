@@ -8,15 +8,17 @@ const WORKERS: &str = "quadfrog:workers";
 
 impl Study {
     /// Joins as a worker with the next free number, from 1 (0 is the session that created the study), and continues with
-    /// the random streams of that worker's seed, [`worker_seed`].
+    /// the random streams of that worker's seed, [`worker_seed`]. [`StudyError::NoWorkerLeft`] after the largest number.
     pub fn join(&mut self) -> Result<u32, StudyError> {
         let study = self.id;
         let mut worker = 0;
         self.journal.commit(|journal| {
             let joined =
                 journal.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
-            worker = joined.unwrap_or(0) as u32 + 1;
-            Ok::<_, JournalError>(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
+            let joined = joined.unwrap_or(0);
+            let next = u32::try_from(joined).ok().and_then(|joined| joined.checked_add(1));
+            worker = next.ok_or(StudyError::NoWorkerLeft { attribute: WORKERS, joined })?;
+            Ok::<_, StudyError>(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
         })?;
         self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
         self.begin_streams();
