@@ -10,8 +10,7 @@ pub fn cores() -> usize {
 }
 
 /// Runs `run` on every item, on at most `threads` threads with a state of `state` each: on those that the system gives, on the calling
-/// thread if it gives none. The order of the results is that of
-/// `items`; items are begun in that order.
+/// thread if it gives none. The order of the results is that of `items`; items are begun in that order.
 ///
 /// # Errors
 /// The error of a state or an item; the other threads finish the items that they have begun and begin no others.

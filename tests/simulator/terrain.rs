@@ -61,7 +61,7 @@ fn a_robot_beside_a_wall_is_placed_on_the_floor() {
 #[test]
 fn a_large_robot_and_one_at_a_steep_slope_are_placed_on_the_ground() {
     let mut slope = config(TerrainKind::Slope);
-    for (angle, heading) in [(1.0, 0.6), (1.45, 3.14), (1.49, -2.5)] {
+    for (angle, heading) in [(1.0, 0.6), (1.45, 3.1), (1.49, -2.5)] {
         (slope.terrain.slope.angle_rad, slope.terrain.slope.heading_rad) = (angle, heading);
         let (simulator, _) = stand(&slope, 0);
         assert!(simulator.smallest_gap().abs() < 1e-9, "{angle} rad: {} m", simulator.smallest_gap());

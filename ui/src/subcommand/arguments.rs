@@ -120,10 +120,10 @@ fn given_or_user(given: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
     Ok(Some(own))
 }
 
-/// Whether a folder has a TOML file; not if the folder does not exist.
+/// Whether a folder has a TOML file; not if there is no such folder.
 fn has_toml(folder: &Path) -> io::Result<bool> {
     let entries = match folder.read_dir() {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(false),
         entries => entries?,
     };
     for entry in entries {

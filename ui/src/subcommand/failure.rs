@@ -1,7 +1,10 @@
 //! The error of a command and its exit status.
 
-use super::output_file::not_written;
+use std::io;
+use std::path::Path;
+
 use crate::notice;
+use anyhow::anyhow;
 use quadfrog::config::ConfigError;
 use quadfrog::engine::EngineError;
 use quadfrog::optimize::journal::JournalError;
@@ -64,6 +67,23 @@ impl From<anyhow::Error> for Failure {
     fn from(report: anyhow::Error) -> Failure {
         Failure::Other(report)
     }
+}
+
+/// Returns the error of a file or a folder that cannot be written. Where another place would do, it is one of the input.
+pub fn not_written(path: &Path, error: &io::Error) -> Failure {
+    let text = format!("{}: cannot be written: {error}", path.display());
+    match is_of_place(error.kind()) {
+        true => Failure::input(format!("{text}; give another place")),
+        false => Failure::Other(anyhow!(text)),
+    }
+}
+
+/// Whether an error of the file system is one of the named place, so that another would do.
+pub fn is_of_place(error: io::ErrorKind) -> bool {
+    use io::ErrorKind::{AlreadyExists, InvalidFilename, IsADirectory, NotADirectory, NotFound};
+    use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
+    matches!(error, AlreadyExists | InvalidFilename | IsADirectory | NotADirectory | NotFound)
+        || matches!(error, PermissionDenied | ReadOnlyFilesystem)
 }
 
 /// Returns the message of an error and of its causes, each once: many messages end with their cause already.

@@ -6,8 +6,8 @@ use crate::put_line;
 use clap::{Args, Command};
 use clap_mangen::Man;
 
-use super::failure::Failure;
-use super::output_file::{not_written, write_whole};
+use super::failure::{Failure, not_written};
+use super::output_file::write_whole;
 
 #[derive(Debug, Args)]
 pub struct ManArguments {

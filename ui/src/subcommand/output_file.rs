@@ -4,9 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use anyhow::anyhow;
-
-use super::failure::Failure;
+use super::failure::{Failure, not_written};
 
 /// Writes a file, as [`write_whole`]. A device or a pipe is written in place. An existing file is replaced only where its name, after
 /// links, ends in `.extension`: a journal, a recording or a script is none of the tables and pictures that commands write.
@@ -136,21 +134,4 @@ pub fn require_writable(file: &Path, remedy: &str) -> Result<(), Failure> {
         .and_then(|()| File::create(&probe))
         .and_then(|_| fs::remove_file(&probe))
         .map_err(|error| Failure::input(format!("{}: cannot be written: {error}; {remedy}", file.display())))
-}
-
-/// Returns the error of a file or a folder that cannot be written. Where another place would do, it is one of the input.
-pub fn not_written(path: &Path, error: &io::Error) -> Failure {
-    let text = format!("{}: cannot be written: {error}", path.display());
-    match is_of_place(error.kind()) {
-        true => Failure::input(format!("{text}; give another place")),
-        false => Failure::Other(anyhow!(text)),
-    }
-}
-
-/// Whether an error of the file system is one of the named place, so that another would do.
-pub fn is_of_place(error: io::ErrorKind) -> bool {
-    use io::ErrorKind::{AlreadyExists, InvalidFilename, IsADirectory, NotADirectory, NotFound};
-    use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
-    matches!(error, AlreadyExists | InvalidFilename | IsADirectory | NotADirectory | NotFound)
-        || matches!(error, PermissionDenied | ReadOnlyFilesystem)
 }

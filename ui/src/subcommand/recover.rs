@@ -9,8 +9,7 @@ use quadfrog::recording::player::Player;
 use quadfrog::recording::{RecordingError, recover};
 use quadfrog::trial::counted;
 
-use super::failure::Failure;
-use super::output_file::is_of_place;
+use super::failure::{Failure, is_of_place};
 
 #[derive(Debug, Args)]
 pub struct RecoverArguments {

@@ -9,8 +9,7 @@ use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
 
-use super::failure::Failure;
-use super::output_file::is_of_place;
+use super::failure::{Failure, is_of_place};
 
 /// A study to run.
 #[derive(Clone)]

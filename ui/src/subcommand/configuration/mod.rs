@@ -16,8 +16,8 @@ use toml::{Table, Value};
 use super::arguments::{load_config_for, load_model, user_folder};
 use super::completion;
 use super::console::settings;
-use super::failure::Failure;
-use super::output_file::{not_written, write_text};
+use super::failure::{Failure, not_written};
+use super::output_file::write_text;
 
 #[derive(Debug, Args)]
 pub struct ConfigCommand {

@@ -6,8 +6,8 @@ use quadfrog::report::figure::Figure;
 use quadfrog::report::page::Page;
 use quadfrog::report::{html, svg};
 
-use crate::subcommand::failure::Failure;
-use crate::subcommand::output_file::{not_written, require_format, require_own};
+use crate::subcommand::failure::{Failure, not_written};
+use crate::subcommand::output_file::{require_format, require_own};
 
 /// Refuses a file for a page when its name is not that of a page, its folder does not exist, or it is something else than a report.
 pub fn require_page(file: &Path) -> Result<(), Failure> {

@@ -22,8 +22,8 @@ pub use self::configuration::{EXAMPLES, ExperimentConfiguration};
 use self::plan::{ExperimentSize, PaperExperiment};
 use self::results::ReproduceResults;
 use super::arguments::whole_number;
-use super::failure::Failure;
-use super::output_file::{not_written, require_own, require_writable, write_text};
+use super::failure::{Failure, not_written};
+use super::output_file::{require_own, require_writable, write_text};
 pub use schedule::{minutes, seconds_left};
 
 /// Name of the results in the output folder.

@@ -10,8 +10,8 @@ use super::figures;
 use super::page::size_text;
 use super::plan::PaperExperiment;
 use super::results::ReproduceResults;
-use crate::subcommand::failure::Failure;
-use crate::subcommand::output_file::{not_written, write_text};
+use crate::subcommand::failure::{Failure, not_written};
+use crate::subcommand::output_file::write_text;
 
 /// The results in a checkout from which table and figures are made.
 const REDUCED_FILE: &str = "docs/reproduced.json";
