@@ -4,6 +4,9 @@ use super::settings::ControlSettings;
 use crate::robot::{JOINTS, JointCommand, Joints, MOTOR_DAMPING_STEP, MotorCommand, RobotState};
 use crate::telemetry::Fault;
 
+/// Largest torque that a controller may want on hardware, N m: a larger one comes from a wrong number, and its limit would still be sent.
+const MOST_WANTED_N_M: f64 = 1e4;
+
 /// Result of the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateOutput {
@@ -11,7 +14,7 @@ pub struct GateOutput {
     pub command: JointCommand,
     /// Bit `i` set: the command of joint `i` was changed.
     pub limited: u16,
-    /// A number was not finite; `command` is damping.
+    /// A number was not finite, or a torque is out of all bounds; `command` is damping.
     pub fault: Option<Fault>,
 }
 
@@ -56,7 +59,7 @@ impl CommandGate {
     /// Limits `wanted`.
     ///
     /// 1. Damping passes unchanged: it needs no measured number.
-    /// 2. A number that is not finite gives damping and a fault.
+    /// 2. A number that is not finite gives damping and a fault, as does, on hardware, a torque beyond 1e4 N m.
     /// 3. Position and gains are clamped.
     /// 4. The torque of the motor's own law at the measured angle and velocity is clamped to `torque_share` of the joint's limit and to
     ///    its rate, by a change of the feed-forward torque.
@@ -77,31 +80,32 @@ impl CommandGate {
         }
         let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
-        let refused = |what| GateOutput {
-            command: damping,
-            limited: u16::MAX >> (16 - JOINTS),
-            fault: Some(Fault::NotFinite { what }),
-        };
+        let refused = |fault| GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault: Some(fault) };
         for joint in 0..JOINTS {
             let motor = &mut passed.command.motor[joint];
             let finite = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
             if !finite.iter().all(|value| value.is_finite()) {
                 self.reset();
-                return refused("a motor command");
+                return refused(Fault::NotFinite { what: "a motor command" });
             }
             let before = *motor;
             motor.position_rad = motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]);
             motor.kp_joint = motor.kp_joint.clamp(0.0, settings.gate.kp_max);
             motor.kd_joint = motor.kd_joint.clamp(0.0, settings.gate.kd_max);
             // tau_motor = tau + kp (q_d - q) + kd (dq_d - dq)
-            let feedback =
-                motor.torque_at(state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]) - motor.torque_n_m;
+            let (q, dq) = (state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]);
+            let feedback = motor.kp_joint * (motor.position_rad - q) + motor.kd_joint * (motor.velocity_rad_s - dq);
             if !feedback.is_finite() {
                 self.reset();
-                return refused("a joint's angle or velocity");
+                return refused(Fault::NotFinite { what: "a joint's angle or velocity" });
             }
             let most_n_m = torque_share * settings.max_torque[joint];
             let wanted_n_m = motor.torque_n_m + feedback;
+            if settings.hardware && wanted_n_m.abs() > MOST_WANTED_N_M {
+                self.reset();
+                let (measured_nm, allowed_nm) = (wanted_n_m, MOST_WANTED_N_M);
+                return refused(Fault::WantedTorque { joint: joint as u8, measured_nm, allowed_nm });
+            }
             let mut torque = wanted_n_m.clamp(-most_n_m, most_n_m);
             if let Some(last) = self.last_torque {
                 let step = settings.gate.torque_step_nm;
@@ -112,7 +116,6 @@ impl CommandGate {
             let kd_joint = motor.kd_joint;
             if motor.torque_n_m.abs() > settings.max_torque[joint] {
                 // tau_motor = tau - kd dq, |tau| at most the limit.
-                let dq = state.joint_velocity_rad_s[joint];
                 let most_kd = (settings.max_torque[joint] - torque * dq.signum()) / dq.abs();
                 let kd_joint = (most_kd / MOTOR_DAMPING_STEP).floor() * MOTOR_DAMPING_STEP;
                 *motor = if damped && kd_joint > 0.0 {

@@ -115,6 +115,7 @@ fn fault_key(fault: &Fault, settings: &ControlSettings) -> Option<KeyValue> {
         Fault::RampTorque { .. } => ("watchdog.ramp_torque_share", limits.ramp_torque_share),
         // No number, or a number of another file.
         Fault::NotFinite { .. }
+        | Fault::WantedTorque { .. }
         | Fault::Reboot
         | Fault::MotorMode { .. }
         | Fault::PoseTimeout { .. }

@@ -27,6 +27,9 @@ pub enum Fault {
     JointPosition { joint: u8, measured_rad: f64, allowed_rad: f64 },
     #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_rad_s, *.allowed_rad_s, "rad/s", 1))]
     JointVelocity { joint: u8, measured_rad_s: f64, allowed_rad_s: f64 },
+    /// The torque is that which the controller wants.
+    #[error("{} wanted a torque of {measured_nm:.1e} N m, limit {allowed_nm:.0} N m; check its sensors", joint_name(*.joint as usize))]
+    WantedTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },
     /// The torque is that which the motor estimates.
     #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_nm, *.allowed_nm, "N m", 1))]
     JointTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },

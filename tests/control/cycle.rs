@@ -149,6 +149,33 @@ fn any_command(spec: TrialSpec) -> impl Strategy<Value = Option<Command>> {
     ]
 }
 
+/// Regression: the gate subtracted the wanted torque from the sum of the motor's law, which cancels beyond 1e17 N m: 1e20 N m on a joint
+/// that turned at -20 rad/s left it with 50.6 N m, limit 35.55 N m.
+#[test]
+fn a_huge_wanted_torque_stays_within_the_limit_and_is_a_fault_on_hardware() {
+    let (_, _, settings) = shipped(Backend::Hardware);
+    for exponent in -2..39 {
+        for torque in [0.9 * 10.0_f64.powi(exponent), -0.9 * 10.0_f64.powi(exponent)] {
+            for speed in [-40.0, -20.0, 0.0, 20.0, 40.0] {
+                let state = RobotState { joint_velocity_rad_s: [speed; JOINTS], ..RobotState::default() };
+                let wanted = JointCommand::damped_torques(&[torque; JOINTS], 0.75, &state.joint_velocity_rad_s);
+                let passed = CommandGate::default().pass(&wanted, &state, &settings);
+                assert_eq!(passed.fault.is_some(), exponent > 4, "{torque} N m: {:?}", passed.fault);
+                if passed.fault.is_some() {
+                    assert_eq!(passed.command, JointCommand::damping(settings.gate.damping_kd));
+                    continue;
+                }
+                for (joint, motor) in passed.command.motor.iter().enumerate() {
+                    assert!(
+                        motor.torque_at(0.0, speed).abs() <= settings.max_torque[joint] + 1e-9,
+                        "{torque}: {motor:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 proptest! {
     /// For any wanted command and measured state: feed-forward torque and the torque of the motor's law are within the joint's
     /// limit, and a datagram can hold the command. Regression: with an encoder at 60 rad/s the gate passed more than 128 N m, the
@@ -156,9 +183,11 @@ proptest! {
     #[test]
     fn what_leaves_the_gate_can_be_said(
         speed in -100.0..100.0_f64, kd in 0.0..20.0_f64, kp in 0.0..300.0_f64, position in -4.0..4.0_f64,
-        torque in -500.0..500.0_f64, before in -20.0..20.0_f64
+        torque in -500.0..500.0_f64, magnitude in 0..36_i32, before in -20.0..20.0_f64
     ) {
         let Bench { settings, .. } = simulated();
+        // Half of the torques are up to 500 N m, the others up to 1e38 N m.
+        let torque = if magnitude % 2 == 0 { torque } else { torque * 10.0_f64.powi(magnitude) };
         let mut gate = CommandGate::default();
         let state = RobotState { joint_velocity_rad_s: [speed; JOINTS], ..RobotState::default() };
         gate.pass(&JointCommand::torques(&[before; JOINTS]), &RobotState::default(), &settings);
