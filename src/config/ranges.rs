@@ -91,6 +91,7 @@ const SAFETY: &[Row] = &[
     (&["consistency.repeated_states"], within!(10, 200, "states")),
     (&["pre_arm.motor_measured_c"], within!(-20, 10, "degrees Celsius")),
     (&["consistency.repeated_motor_states"], within!(5, 100, "states")),
+    (&["consistency.accel_most_m_s2"], within!(50, 1e5, "m/s^2")),
     // Gravity is 9.81.
     (&["consistency.gravity_m_s2", "pre_arm.gravity_m_s2"], within!(0.1, 3, "m/s^2")),
     // A robot tips beyond.

@@ -4,6 +4,7 @@
 //! A fall during a trial is an outcome of the trial, detected by `running_trial::FallWatch`; it damps as well.
 
 use super::consistency::FOREIGN_COMMANDS;
+use super::estimator::{MOST_IN_A_ROW, MOST_RECENT};
 use super::failsafe_causes::{
     body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
     joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_silent,
@@ -153,7 +154,13 @@ const TABLE: [FailsafeRow; 25] = [
     ),
     row(
         "body not finite",
-        |_| "a number of the inertial unit or a foot sensor is NaN or infinite".to_owned(),
+        |s| {
+            let most = s.consistency.accel_most_m_s2;
+            format!(
+                "a number of the inertial unit or a foot sensor is NaN or infinite; more than {MOST_IN_A_ROW} states in a row or \
+                 {MOST_RECENT} in 1 s with a specific force beyond {most} m/s^2, on hardware"
+            )
+        },
         body_not_finite,
         Mode::commanded,
         STATE_UNKNOWN,

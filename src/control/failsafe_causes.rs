@@ -57,7 +57,7 @@ pub(super) fn joints_not_finite(_: &PeriodWatch, inputs: &FailsafeInputs, _: &Co
 }
 
 pub(super) fn body_not_finite(_: &PeriodWatch, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {
-    command_gate::body_finite(inputs.state).err()
+    command_gate::body_finite(inputs.state).err().or(inputs.accelerometer_fault)
 }
 
 pub(super) fn reboot(_: &PeriodWatch, inputs: &FailsafeInputs, _: &ControlSettings) -> Option<Fault> {

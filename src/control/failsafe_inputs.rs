@@ -3,7 +3,7 @@
 use super::consistency::Consistency;
 use super::settings::ControlSettings;
 use crate::robot::{CONTROL_PERIOD_S, LinkStatus, RobotState};
-use crate::telemetry::{Estimate, Mode};
+use crate::telemetry::{Estimate, Fault, Mode};
 
 /// Data of one tick for the failsafes.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +36,8 @@ pub struct FailsafeInputs<'a> {
     pub events_lost: bool,
     /// Consistency of sensors, clocks and commands.
     pub consistency: &'a Consistency,
+    /// The fault of an accelerometer with too many impossible values.
+    pub accelerometer_fault: Option<Fault>,
     /// Time for which the computer was suspended since the last tick, ms.
     pub suspended_ms: u32,
     /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.

@@ -8,6 +8,9 @@ use crate::robot::{LEGS, PerLeg};
 /// Shortest absence of all feet that counts as a flight, s; a foot may lift for a moment in stance.
 pub const SHORTEST_FLIGHT_S: f64 = 0.02;
 
+/// Largest component of the velocity that shifts a foot, m/s: faster than a jump, so that a wrong estimate moves no foot further.
+const MOST_M_S: f64 = 3.0;
+
 /// The legs in swing: all of them in flight, and those in landing whose feet have not touched down yet.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SwingLegs {
@@ -41,9 +44,10 @@ impl SwingLegs {
     }
 
     /// Shift of each leg's nominal foot position, leg frame, m: T v.xy for legs in swing, with T = `foot_placement_s` and the
-    /// trunk's velocity v in body axes, m/s. Zero for the others.
+    /// trunk's velocity v in body axes, each component at most 3 m/s. Zero for the others.
     pub fn offsets_leg(&self, foot_placement_s: f64, velocity_body: &Vector3<f64>) -> PerLeg<Vector3<f64>> {
-        let offset = Vector3::new(foot_placement_s * velocity_body.x, foot_placement_s * velocity_body.y, 0.0);
+        let velocity = velocity_body.map(|component| component.clamp(-MOST_M_S, MOST_M_S));
+        let offset = Vector3::new(foot_placement_s * velocity.x, foot_placement_s * velocity.y, 0.0);
         self.swing.map(|swing| if swing && foot_placement_s != 0.0 { offset } else { Vector3::zeros() })
     }
 }

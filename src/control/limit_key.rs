@@ -100,6 +100,7 @@ fn fault_key(fault: &Fault, settings: &ControlSettings) -> Option<KeyValue> {
         Fault::Slow { .. } => ("watchdog.period_factor", limits.period_factor),
         Fault::OperatorLost { .. } => ("watchdog.operator_silent_ms", limits.operator_silent_ms.into()),
         Fault::Sensors { check, .. } => (sensor_key(check), settings.consistency.allowed(check)),
+        Fault::Acceleration { .. } => ("consistency.accel_most_m_s2", settings.consistency.accel_most_m_s2),
         Fault::RobotClock { .. } => ("consistency.clock_step_ms", settings.consistency.clock_step_ms),
         Fault::OtherCommander { sign: CommanderSign::LostStates, .. } => {
             ("consistency.loss_share", settings.consistency.loss_share)

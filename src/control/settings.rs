@@ -157,6 +157,8 @@ pub struct ConsistencyLimits {
     pub repeated_states: u32,
     /// Most states in a row with the same measurements of a motor while the robot jumps.
     pub repeated_motor_states: u32,
+    /// Largest component of a specific force that counts as measured, m/s^2.
+    pub accel_most_m_s2: f64,
     /// Largest deviation of the averaged specific force from gravity while standing, m/s^2.
     pub gravity_m_s2: f64,
     /// Largest angle from the orientation's upward direction to that of gyroscope and accelerometer, rad.

@@ -23,6 +23,11 @@ pub enum FallCause {
 pub enum Fault {
     #[error("{what} is not a finite number")]
     NotFinite { what: &'static str },
+    /// Values that no motion has; the measured one is the last of them.
+    #[error(
+        "the accelerometer reports impossible values, {measured_m_s2:.1e} m/s^2, limit {allowed_m_s2} m/s^2, in {states} states within 1 s; check the inertial unit"
+    )]
+    Acceleration { measured_m_s2: f64, allowed_m_s2: f64, states: u32 },
     #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_rad, *.allowed_rad, "rad", 3))]
     JointPosition { joint: u8, measured_rad: f64, allowed_rad: f64 },
     #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_rad_s, *.allowed_rad_s, "rad/s", 1))]

@@ -13,6 +13,7 @@ mod go1;
 #[path = "../support/robots.rs"]
 mod robots;
 
+mod accelerometer;
 mod arming;
 mod consistency;
 mod covariance;
@@ -21,6 +22,7 @@ mod estimator;
 mod estimator_late;
 mod failsafe;
 mod force_signs;
+mod gaps;
 mod landing;
 mod landing_terms;
 mod mode;

@@ -217,6 +217,7 @@ fn ends(settings: &ControlSettings) -> Vec<TrialEnd> {
         Fault::Slow { ticks: 5, measured_ms, allowed_ms },
         Fault::PoseTimeout { error_rad: 0.3 },
         Fault::OperatorLost { silent_ms: 1200 },
+        Fault::Acceleration { measured_m_s2: 500.0, allowed_m_s2: 320.0, states: 6 },
         Fault::RobotClock { measured_ms, allowed_ms },
         Fault::OtherCommander { sign: CommanderSign::LostStates, measured, allowed },
         Fault::OtherCommander { sign: CommanderSign::ForeignTorque, measured, allowed },

@@ -3,7 +3,7 @@
 use super::inputs::ConsistencyInputs;
 use super::leaky::kept;
 use crate::control::settings::ControlSettings;
-use crate::robot::{GRAVITY, PerLeg, RobotState};
+use crate::robot::{GRAVITY, PerLeg};
 use crate::telemetry::Mode;
 
 /// Time constant of the averaged sum, s.
@@ -27,14 +27,14 @@ pub(super) struct FootLoads {
 }
 
 impl FootLoads {
-    pub fn begin(state: &RobotState) -> FootLoads {
-        let accel_m_s2 = state.imu.accel_body.norm();
-        FootLoads { load_n: state.foot_force_n.iter().sum(), accel_m_s2, ..FootLoads::default() }
+    pub fn begin(inputs: &ConsistencyInputs) -> FootLoads {
+        let accel_m_s2 = inputs.accel_body.norm();
+        FootLoads { load_n: inputs.state.foot_force_n.iter().sum(), accel_m_s2, ..FootLoads::default() }
     }
 
     pub fn update(&mut self, inputs: &ConsistencyInputs, dt_s: f64, settings: &ControlSettings) {
         let limits = &settings.consistency;
-        let accel_m_s2 = inputs.state.imu.accel_body.norm();
+        let accel_m_s2 = inputs.accel_body.norm();
         let share = kept(dt_s, LOAD_S);
         self.load_n = self.load_n * share + inputs.state.foot_force_n.iter().sum::<f64>() * (1.0 - share);
         self.accel_m_s2 = self.accel_m_s2 * share + accel_m_s2 * (1.0 - share);

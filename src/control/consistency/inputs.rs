@@ -1,10 +1,14 @@
 //! Data of one tick for the consistency checks.
 
+use nalgebra::Vector3;
+
 use crate::robot::{JointCommand, LinkStatus, RobotState};
 use crate::telemetry::{Estimate, Mode};
 
-/// Longest time between two states over which rates are integrated, s; a longer gap hides too much.
-const LONGEST_STEP_S: f64 = 0.0035;
+/// Longest time between two states over which the mean of both rates is compared as it is, s.
+const SHORT_STEP_S: f64 = 0.0035;
+/// Time between two states beyond which a landing may hide more than half the change of the rates, s.
+const HIDING_STEP_S: f64 = 0.015;
 
 /// Data of one tick.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +21,8 @@ pub struct ConsistencyInputs<'a> {
     pub is_new: bool,
     /// The robot's clock went backwards since the last tick.
     pub restarted: bool,
+    /// Specific force of the estimator, body axes, m/s^2: the last possible one.
+    pub accel_body: Vector3<f64>,
     /// Estimate from the state.
     pub estimate: &'a Estimate,
     /// Time of this computer, ns.
@@ -31,12 +37,24 @@ pub struct ConsistencyInputs<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct StateStep {
     pub dt_s: f64,
-    /// Whether rates may be integrated over it.
-    pub is_short: bool,
+    /// Whether changes are compared with the integral of their rates: not over a gap that trips the failsafe for missing states.
+    pub is_compared: bool,
 }
 
 impl StateStep {
-    pub fn new(dt_s: f64) -> StateStep {
-        StateStep { dt_s, is_short: dt_s < LONGEST_STEP_S }
+    /// `state_age_ms` is the limit of the failsafe. Twice of it: a state that arrives faster than the one before the gap is further from it
+    /// in the robot's time.
+    pub fn new(dt_s: f64, state_age_ms: u32) -> StateStep {
+        StateStep { dt_s, is_compared: dt_s < 2e-3 * f64::from(state_age_ms) }
+    }
+
+    /// Returns the change that the mean of both rates may miss, rad, where the rate changed by `change_rad_s`: half of that over the whole
+    /// gap, as of a rate that changed at its begin or at its end. In a longer gap a rate may also rise and fall again: `hidden_rad_s` for
+    /// the time beyond.
+    pub fn allowance_rad(&self, change_rad_s: f64, hidden_rad_s: f64) -> f64 {
+        if self.dt_s < SHORT_STEP_S {
+            return 0.0;
+        }
+        0.5 * change_rad_s * self.dt_s + hidden_rad_s * (self.dt_s - HIDING_STEP_S).max(0.0)
     }
 }

@@ -63,16 +63,16 @@ impl Consistency {
         match (self.last.replace(*state), passed_ms) {
             (Some(last), Some(passed_ms @ 1..)) => {
                 let dt_s = f64::from(passed_ms) * CONTROL_PERIOD_S;
-                let step = StateStep::new(dt_s);
-                self.inertial.update(&last.imu, &state.imu, &step, inputs.mode.energised());
+                let step = StateStep::new(dt_s, settings.failsafe.state_age_ms);
+                self.inertial.update(&last.imu, &state.imu, &inputs.accel_body, &step, inputs.mode.energised());
                 self.feet.update(inputs, dt_s, settings);
                 self.joints.update(&last, state, &step);
                 self.commander.compare_torques(inputs, dt_s, settings);
             }
             // The first state, or one after a restart of the robot's clock.
             _ => {
-                self.inertial = InertialUnit::begin(&state.imu);
-                self.feet = FootLoads::begin(state);
+                self.inertial = InertialUnit::begin(&state.imu, &inputs.accel_body);
+                self.feet = FootLoads::begin(inputs);
                 self.joints = JointRates::default();
             }
         }

@@ -36,6 +36,7 @@ impl Cycle {
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
             consistency: &self.consistency,
+            accelerometer_fault: self.estimator.accelerometer_fault(&self.settings.consistency),
             suspended_ms: inputs.suspended_ms,
             guard_silent_ms: inputs.guard_silent_ms,
             remote_silent_ms: self.remote_silent_ms,

@@ -311,6 +311,7 @@ impl Cycle {
             state: &self.tick.state,
             is_new: self.state_age_ms == 0,
             restarted,
+            accel_body: self.estimator.accel_body(),
             estimate: &self.tick.estimate,
             now_ns: inputs.time_ns.saturating_add(inputs.lateness_ns),
             link: robot.link(),

@@ -98,13 +98,15 @@ impl Filter {
         self.vector(BIAS)
     }
 
-    /// Predicts over `dt_s` with the specific force `accel_body` (m/s^2) at its end, which is the mean of the last period.
+    /// Predicts over `dt_s` with the specific force `accel_body` (m/s^2) at its end, which is the mean of the last period; if it is not
+    /// `measured`, it is an earlier one, and the last period is a part of the gap.
     ///
     /// Over a gap in the states the acceleration steps from the last known one to this one: the mean assumes the middle of the gap,
     /// the variance any time in it.
     pub fn predict(
         &mut self,
         accel_body: &Vector3<f64>,
+        measured: bool,
         world_from_body: &Matrix3<f64>,
         feet: &PerLeg<FootOdometry>,
         dt_s: f64,
@@ -116,7 +118,7 @@ impl Filter {
         let now = MotionSample { acceleration_world, rolling_world: feet.map(|motion| motion.rolling_world) };
         let before = self.last.replace(now).unwrap_or(now);
         // a' = a - (a - a_0) / 2 * (unseen / dt): over a gap the mean of both ends, but for the period that was measured.
-        let unseen_s = (dt_s - CONTROL_PERIOD_S).max(0.0);
+        let unseen_s = if measured { (dt_s - CONTROL_PERIOD_S).max(0.0) } else { dt_s };
         let unseen_share = if unseen_s > 0.0 { unseen_s / dt_s } else { 0.0 };
         let change = now.acceleration_world - before.acceleration_world;
         let acceleration = acceleration_world - change * (0.5 * unseen_share);

@@ -6,6 +6,7 @@
 //!
 //! Yaw is that of the inertial unit, with its drift: no other sensor measures it.
 
+mod accelerometer;
 mod contact;
 pub mod covariance;
 mod filter;
@@ -16,11 +17,13 @@ pub use contact::ContactGate;
 pub use filter::{Filter, FootOdometry};
 
 use super::command_gate;
-use super::settings::{ControlSettings, ObjectiveSource};
+use super::settings::{ConsistencyLimits, ControlSettings, ObjectiveSource};
 use crate::robot::kinematics::FootPosition;
 use crate::robot::rotation::roll_pitch_yaw;
 use crate::robot::{PerLeg, RobotState, Truth, leg_of, robot_time_passed};
-use crate::telemetry::Estimate;
+use crate::telemetry::{Estimate, Fault};
+use accelerometer::Accelerometer;
+pub use accelerometer::{MOST_IN_A_ROW, MOST_RECENT};
 
 /// Estimator with its state from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -29,6 +32,7 @@ pub struct Estimator {
     /// Whether there was an orientation, from which yaw is unwrapped.
     started: bool,
     contact: ContactGate,
+    accelerometer: Accelerometer,
     odometry: Option<Odometry>,
 }
 
@@ -50,6 +54,16 @@ impl Estimator {
     /// The filter; none before the first state, or with the simulator's true state.
     pub fn filter(&self) -> Option<&Filter> {
         self.odometry.as_ref().map(|odometry| &odometry.filter)
+    }
+
+    /// The specific force that is integrated, body axes, m/s^2: the last possible one.
+    pub fn accel_body(&self) -> Vector3<f64> {
+        self.accelerometer.body()
+    }
+
+    /// The fault of an accelerometer with too many impossible values.
+    pub fn accelerometer_fault(&self, limits: &ConsistencyLimits) -> Option<Fault> {
+        self.accelerometer.fault(limits)
     }
 
     /// Updates the estimate with a state and the feet at its joint angles. A repeated state, or one with a number that is not finite
@@ -101,6 +115,7 @@ impl Estimator {
         let motions = foot_motions(state, feet, settings);
         let weights = &settings.estimator;
 
+        let most_m_s2 = settings.hardware.then_some(settings.consistency.accel_most_m_s2);
         let passed_ms = |odometry: &Odometry| robot_time_passed(state.robot_time_ms, odometry.robot_time_ms);
         // A clock that goes back belongs to another or a restarted robot: start again.
         let filter = match self.odometry.as_mut().filter(|odometry| passed_ms(odometry) >= 0) {
@@ -113,17 +128,21 @@ impl Estimator {
                 estimate.contact = self.contact.update(&state.foot_force_n, dt_s, weights);
                 let standing = estimate.contact.contains(&true);
                 odometry.airborne_s = if standing { 0.0 } else { odometry.airborne_s + dt_s };
+                let measured = self.accelerometer.update(&state.imu, dt_s, most_m_s2);
+                let accel_body = self.accelerometer.body();
                 let filter = &mut odometry.filter;
                 if odometry.airborne_s > weights.longest_flight_s {
                     filter.rest(weights);
                 } else {
-                    filter.predict(&state.imu.accel_body, &world_from_body, &motions, dt_s, weights);
+                    filter.predict(&accel_body, measured, &world_from_body, &motions, dt_s, weights);
                     filter.correct(&motions, &estimate.contact, dt_s, weights);
                 }
                 &*filter
             }
             None => {
                 self.contact = ContactGate::default();
+                self.accelerometer = Accelerometer::default();
+                self.accelerometer.update(&state.imu, 0.0, most_m_s2);
                 estimate.contact = self.contact.update(&state.foot_force_n, 0.0, weights);
                 // The world's origin is the ground under the trunk; the lowest foot stands on it.
                 let lowest = motions.iter().map(|motion| motion.offset_world.z).fold(f64::INFINITY, f64::min);
