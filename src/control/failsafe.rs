@@ -8,7 +8,7 @@ use super::estimator::{MOST_IN_A_ROW, MOST_RECENT};
 use super::failsafe_causes::{
     body_not_finite, corrupt, delay, events_lost, guard_silent, hottest, joint_position, joint_torque, joint_velocity,
     joints_not_finite, late, link_lost, motor_hot, motor_mode, operator_silent, other_commander, reboot, remote_silent,
-    remote_stop, robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
+    remote_stop, reported_charge, robot_clock, send_error, sensors, slow, state_age, suspended, tilt,
 };
 pub use super::failsafe_inputs::{FailsafeInputs, MotionPhase, PeriodWatch};
 use super::settings::ControlSettings;
@@ -342,15 +342,28 @@ impl PeriodWatch {
 
 /// Returns the reason to refuse the next trial (HOLD); a running trial finishes.
 ///
-/// 1. Battery below its limit.
-/// 2. A motor at its warm limit.
+/// 1. Battery below its limit, or, on hardware, without a charge between 0 and 100 percent.
+/// 2. A motor at its warm limit, or, on hardware, one that does not measure.
 /// 3. A remote control that is needed and silent.
 /// 4. Delay of the link, `delay_growth_ms`, above its limit.
 pub fn trial_inhibit(state: &RobotState, delay_growth_ms: f64, settings: &ControlSettings) -> Option<TrialInhibit> {
     let limits = &settings.failsafe;
-    let low = state.battery.map(|battery| battery.charge_percent).filter(|charge| *charge < limits.battery_percent);
-    if let Some(measured_percent) = low {
+    let measured_percent = reported_charge(state);
+    if settings.hardware && measured_percent.is_nan() {
+        return Some(TrialInhibit::BatteryUnreported);
+    }
+    if measured_percent < limits.battery_percent {
         return Some(TrialInhibit::BatteryLow { measured_percent, allowed_percent: limits.battery_percent });
+    }
+    let allowed_c = settings.arming.motor_measured_c;
+    let unmeasured =
+        state.motor_temperature_c.iter().position(|measured_c| measured_c.is_nan() || *measured_c < allowed_c);
+    if let Some(joint) = unmeasured.filter(|_| settings.hardware) {
+        return Some(TrialInhibit::MotorUnmeasured {
+            joint: joint as u8,
+            measured_c: state.motor_temperature_c[joint],
+            allowed_c,
+        });
     }
     let (joint, measured_c) = hottest(state);
     if measured_c >= limits.motor_warm_c {

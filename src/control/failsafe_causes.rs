@@ -136,6 +136,12 @@ pub(super) fn operator_silent(_: &PeriodWatch, inputs: &FailsafeInputs, settings
     (silent_ms > settings.failsafe.operator_silent_ms).then_some(Fault::OperatorLost { silent_ms })
 }
 
+/// Charge of the battery, percent; not a number where none between 0 and 100 is reported. 255 is a usual "not available".
+pub(super) fn reported_charge(state: &RobotState) -> f64 {
+    let charge = state.battery.map(|battery| battery.charge_percent);
+    charge.filter(|percent| (0.0..=100.0).contains(percent)).unwrap_or(f64::NAN)
+}
+
 /// Index and temperature (degrees Celsius) of the hottest motor.
 pub(super) fn hottest(state: &RobotState) -> (u8, f64) {
     let temperatures = state.motor_temperature_c.iter().enumerate();

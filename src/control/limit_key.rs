@@ -65,6 +65,7 @@ fn inhibit_key(inhibit: &TrialInhibit, settings: &ControlSettings) -> Option<Key
     let limits = &settings.failsafe;
     Some(match inhibit {
         TrialInhibit::BatteryLow { .. } => ("watchdog.battery_percent", limits.battery_percent),
+        TrialInhibit::MotorUnmeasured { .. } => ("pre_arm.motor_measured_c", settings.arming.motor_measured_c),
         TrialInhibit::MotorWarm { .. } => ("watchdog.motor_warm_c", limits.motor_warm_c),
         TrialInhibit::FootForces { measured_n, least_n, .. } if measured_n < least_n => {
             ("ready.force_share_min", settings.ready.force_share_min)
@@ -77,7 +78,10 @@ fn inhibit_key(inhibit: &TrialInhibit, settings: &ControlSettings) -> Option<Key
         TrialInhibit::TicksLate { .. } => ("pre_arm.late_share", settings.arming.late_share),
         TrialInhibit::LinkDelay { .. } => ("watchdog.delay_hold_ms", limits.delay_hold_ms),
         // No number, or a number of another file.
-        TrialInhibit::RemoteSilent | TrialInhibit::FeetUp { .. } | TrialInhibit::NotQuiet { .. } => return None,
+        TrialInhibit::BatteryUnreported
+        | TrialInhibit::RemoteSilent
+        | TrialInhibit::FeetUp { .. }
+        | TrialInhibit::NotQuiet { .. } => return None,
     })
 }
 

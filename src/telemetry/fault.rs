@@ -233,8 +233,12 @@ pub(crate) fn digits_apart(measured: f64, limit: f64, digits: usize) -> usize {
 pub enum TrialInhibit {
     #[error("battery at {}; charge or change it", needs(*.measured_percent, *.allowed_percent, "%", 0))]
     BatteryLow { measured_percent: f64, allowed_percent: f64 },
+    #[error("the battery does not report a charge from 0 to 100 %; sit down and check it")]
+    BatteryUnreported,
     #[error("motor {} at {measured_c:.0} degrees Celsius, a jump needs less than {allowed_c:.0}; sit down and wait", joint_name(*.joint as usize))]
     MotorWarm { joint: u8, measured_c: f64, allowed_c: f64 },
+    #[error("motor {} reports {measured_c:.0} degrees Celsius, no measurement below {allowed_c:.0}; sit down and restart the robot", joint_name(*.joint as usize))]
+    MotorUnmeasured { joint: u8, measured_c: f64, allowed_c: f64 },
     #[error("the remote control does not answer, a jump needs it; switch it on and bring it in reach")]
     RemoteSilent,
     #[error("{down} of 4 feet on the ground, a jump needs all; check stance and foot sensors")]

@@ -57,7 +57,7 @@ fn a_sound_robot_is_armed() {
 #[test]
 fn each_check_refuses_arming_by_itself() {
     type Breaks = fn(&mut ArmingBench);
-    let table: [(ArmingCheck, Breaks); 20] = [
+    let table: [(ArmingCheck, Breaks); 22] = [
         (ArmingCheck::StateFresh, |b| b.robot.state = Err(RobotError::NoNewState { age_ms: 12 })),
         (ArmingCheck::Loss, |b| b.robot.link.recent_lost = 60),
         (ArmingCheck::Checksums, |b| b.robot.link.recent_corrupt = 1),
@@ -91,6 +91,9 @@ fn each_check_refuses_arming_by_itself() {
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c = [0.0; 12]),
         (ArmingCheck::MotorsCool, |b| b.state().motor_temperature_c[5] = -1.0),
         (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = f64::NAN),
+        // Regression: a byte that means "not available" passed as a full battery.
+        (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 255.0),
+        (ArmingCheck::Battery, |b| b.state().battery.as_mut().unwrap().charge_percent = 101.0),
     ];
     for (check, breaks) in table {
         let mut bench = lying_still();

@@ -310,6 +310,34 @@ fn what_holds_lets_the_trial_finish_and_refuses_the_next() {
     }
 }
 
+/// Measurements that fall silent after arming refuse the next trial. Regression: a charge above 100 % passed as a full battery, one that
+/// was no longer reported and motors that report no temperature as sound ones.
+#[test]
+fn a_battery_or_a_motor_that_falls_silent_refuses_the_next_trial() {
+    let silent: [(Tamper, &str); 6] = [
+        (|state| state.battery = None, "battery does not report a charge"),
+        (|state| state.battery.as_mut().unwrap().charge_percent = 255.0, "battery does not report a charge"),
+        (|state| state.battery.as_mut().unwrap().charge_percent = 101.0, "battery does not report a charge"),
+        (|state| state.battery.as_mut().unwrap().charge_percent = f64::NAN, "battery does not report a charge"),
+        (|state| state.motor_temperature_c[2] = 0.0, "motor FR_calf reports 0 degrees"),
+        (|state| state.motor_temperature_c = [-128.0; JOINTS], "motor FR_hip reports -128 degrees"),
+    ];
+    for (tamper, words) in silent {
+        let mut bench = in_mode(Mode::Ready);
+        bench.settle();
+        bench.robot.tamper = tamper;
+        bench.ticks(2);
+        bench.command(bench.approved());
+        let inhibit = bench.cycle.readiness().inhibit.unwrap_or_else(|| panic!("nothing holds: {words}"));
+        assert!(inhibit.to_string().contains(words), "{inhibit}");
+        assert_eq!((bench.cycle.mode(), bench.refusal()), (Mode::Ready, Some(CommandRefusal::Inhibited(inhibit))));
+        bench.robot.tamper = |_| {};
+        bench.ticks(2);
+        bench.command(bench.approved());
+        assert_eq!(bench.cycle.mode(), Mode::Countdown, "{words}");
+    }
+}
+
 /// Operator lost in flight: the nominal controller lands, and the robot sits down soon after touchdown, quiet or not.
 #[test]
 fn an_operator_lost_in_flight_is_landed_and_sat_down() {

@@ -232,6 +232,7 @@ fn ends(settings: &ControlSettings) -> Vec<TrialEnd> {
     let inhibits = [
         TrialInhibit::BatteryLow { measured_percent: 10.0, allowed_percent: 15.0 },
         TrialInhibit::MotorWarm { joint, measured_c: 71.0, allowed_c: 70.0 },
+        TrialInhibit::MotorUnmeasured { joint, measured_c: 0.0, allowed_c: 1.0 },
         TrialInhibit::FootForces { measured_n: 10.0, least_n: 60.0, most_n: 180.0 },
         TrialInhibit::FootForces { measured_n: 190.0, least_n: 60.0, most_n: 180.0 },
         TrialInhibit::NotLevel { measured_rad, allowed_rad },

@@ -1,13 +1,11 @@
-//! The charge suffices for a series of jumps; a battery that is not reported fails.
+//! The charge suffices for a series of jumps; a battery that is not reported, or with more than 100 %, fails.
 
 use super::check::*;
+use crate::control::failsafe_causes::reported_charge;
 
 pub(super) const CHECK: ControlCheck = ControlCheck {
     check: ArmingCheck::Battery,
-    measure: |inputs, settings| {
-        let charge = inputs.state.battery.map_or(f64::NAN, |battery| battery.charge_percent);
-        Reading::at_least(charge, settings.arming.battery_percent)
-    },
+    measure: |inputs, settings| Reading::at_least(reported_charge(inputs.state), settings.arming.battery_percent),
     found: |finding| format!("{:.0} %", finding.measured),
     needed: |limits| format!("at least {:.0} %", limits.battery_percent),
 };
