@@ -196,7 +196,7 @@ fn every_accepted_number_of_robot_toml_runs_a_trial() {
 /// (Defects once: all of these were accepted with a robot, and the arming checks passed.)
 #[test]
 fn limits_that_protect_nothing_are_refused_on_hardware_with_range_and_remedy() {
-    let mutants: [(&str, &str, &[&str]); 18] = [
+    let mutants: [(&str, &str, &[&str]); 22] = [
         (
             "safety.toml",
             "[watchdog]\nstate_age_ms = 400\nlink_lost_ms = 900",
@@ -214,6 +214,10 @@ fn limits_that_protect_nothing_are_refused_on_hardware_with_range_and_remedy() {
         ("safety.toml", "[gate]\ntorque_step_nm = 1000", &["gate.torque_step_nm", "5 to 40"]),
         ("safety.toml", "[pre_arm]\nbattery_percent = 0", &["pre_arm.battery_percent", "10 to 100"]),
         ("safety.toml", "[pre_arm]\nlate_share = 1", &["pre_arm.late_share", "0 to 0.1"]),
+        ("safety.toml", "[pre_arm]\nmotor_measured_c = -20", &["pre_arm.motor_measured_c", "0 to 10"]),
+        ("safety.toml", "[consistency]\nloss_share = 0.5", &["consistency.loss_share", "0.005 to 0.2"]),
+        ("safety.toml", "[hop_envelope]\nstart = 1.0", &["hop_envelope.start", "0.1 to 0.6"]),
+        ("safety.toml", "[hop_envelope]\nstep = 1.0", &["hop_envelope.step", "0.01 to 0.2"]),
         ("safety.toml", "[parameters]\nFz = [0, 5000]", &["`parameters.Fz` = 5000", "0 to 500 N", "400"]),
         ("safety.toml", "[gains]\nkp = [300, 5000]", &["`gains.kp` = 5000", "100 to 1200"]),
         ("control.toml", "[countdown]\nhardware_s = 0.001", &["`countdown.hardware_s` = 0.001", "1 to 60 s", "3"]),

@@ -180,6 +180,15 @@ const SAFETY_HARDWARE: &[Row] = &[
     (&["pre_arm.lying_tolerance_rad"], within!(0.05, 0.8, "rad")),
     (&["pre_arm.battery_percent"], within!(10, 100, "percent")),
     (&["pre_arm.motor_c"], within!(20, 75, "degrees Celsius")),
+    // 0 is an empty field.
+    (&["pre_arm.motor_measured_c"], within!(0, 10, "degrees Celsius")),
+    // From the range of a unit of 16 g, which a landing reaches, to four times of it.
+    (&["consistency.accel_most_m_s2"], within!(157, 640, "m/s^2")),
+    // Another program that commands takes half of the states.
+    (&["consistency.loss_share"], within!(0.005, 0.2, "of the states")),
+    // A first jump at the bounds of the forces is none of a robot that has not jumped yet.
+    (&["hop_envelope.start"], within!(0.1, 0.6)),
+    (&["hop_envelope.step"], within!(0.01, 0.2)),
     (&["pre_arm.gyro_rad_s"], within!(0.01, 0.5, "rad/s")),
     (&["pre_arm.still_s"], within!(0.2, 10, "s")),
     (&["pre_arm.late_ms"], within!(0.1, 2, "ms")),
