@@ -159,7 +159,8 @@ impl Cycle {
     }
 
     /// Joint angles of standing, rad: the nominal stance lowered by dz with 4 kp dz = m g, where the impedance carries the weight.
-    /// The change from the ramp to impedance control then has no step.
+    /// The change from the ramp to impedance control then has no step of the pose; the torque of a joint steps, by 4.4 N m at a hip of
+    /// the simulated Go1 with hardware-like motors.
     fn pose_of(&self, gains: &Gains, stance_leg: &Vector3<f64>) -> Joints {
         let sag = self.settings.weight_n / (LEGS as f64 * gains.kp);
         let foot_leg = stance_leg + Vector3::new(0.0, 0.0, sag);

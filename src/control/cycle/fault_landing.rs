@@ -10,7 +10,8 @@ use crate::control::settings::RampSettings;
 use crate::robot::ticks_in;
 use crate::telemetry::{FailsafeWarning, Fault, Mode};
 
-/// Time in which the targets of the held stance move there from the last known joint angles, s: no step of the torque.
+/// Time in which the targets of the held stance move there from the last known joint angles, s: no step of the targets. The torque of the
+/// last command ends at once.
 const HOLD_RAMP_S: f64 = 0.1;
 
 impl Cycle {
