@@ -338,6 +338,15 @@ fn a_battery_or_a_motor_that_falls_silent_refuses_the_next_trial() {
     }
 }
 
+/// Regression: before a robot had answered, its battery was said to report no charge.
+#[test]
+fn before_the_first_state_nothing_refuses_a_trial() {
+    let mut bench = linked();
+    bench.robot.silent_ms = 1;
+    bench.ticks(3);
+    assert_eq!((bench.cycle.mode(), bench.cycle.readiness().inhibit), (Mode::Offline, None));
+}
+
 /// Operator lost in flight: the nominal controller lands, and the robot sits down soon after touchdown, quiet or not.
 #[test]
 fn an_operator_lost_in_flight_is_landed_and_sat_down() {

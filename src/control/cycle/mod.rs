@@ -195,8 +195,11 @@ impl Cycle {
         }
     }
 
-    /// Returns the reason to refuse the next trial.
+    /// Returns the reason to refuse the next trial; none before the first state, of which nothing is known.
     fn inhibit(&self) -> Option<TrialInhibit> {
+        if self.mode == Mode::Offline {
+            return None;
+        }
         failsafe::trial_inhibit(&self.tick.state, self.link_quality.delay_growth_ms(), &self.settings)
     }
 
