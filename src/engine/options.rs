@@ -140,7 +140,7 @@ pub enum EngineError {
     Unusable { journal: String, name: String, reason: String },
     #[error("{}: holds no study that this program made", file.display())]
     NoStudy { file: PathBuf },
-    #[error("{}: another session is running in this folder ({owner}); end it first, or watch it with `quadfrog attach`", folder.display())]
+    #[error("{}: another session is running in this folder ({owner}); end it first; a console can be watched with `quadfrog attach`", folder.display())]
     InUse { folder: PathBuf, owner: String },
     #[error(
         "{study}: it was made on {made}, this session runs on {asked}: its points and verdicts are those of another machine. Begin a new study, or give --accept-backend-change to continue it"

@@ -5,13 +5,16 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-/// Regression: after a line that is not UTF-8 no fault was taken any more, without a word.
+/// Regressions: after a line that is not UTF-8 no fault was taken any more, without a word; a line without an end was kept whole, up to
+/// the end of the memory.
 #[test]
-fn faults_are_taken_after_a_line_that_is_not_utf_8() {
+fn faults_are_taken_after_a_line_that_is_none() {
     let mut emulate = Command::new(env!("CARGO_BIN_EXE_quadfrog"));
     emulate.args(["emulate", "--bind", "127.0.0.1:0"]).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut emulator = emulate.spawn().unwrap();
-    emulator.stdin.as_mut().unwrap().write_all(b"loss 5\n\xff\xfe\nloss 7\n").unwrap();
+    let long = [b'x'; 3000];
+    let input = [b"loss 5\n\xff\xfe\n".as_slice(), &long, b"\nloss 7\n"].concat();
+    emulator.stdin.as_mut().unwrap().write_all(&input).unwrap();
     let (said, lines) = channel();
     let output = BufReader::new(emulator.stdout.take().unwrap());
     std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| said.send(line)));

@@ -1,6 +1,6 @@
 //! `quadfrog emulate`: serves the simulator as a Go1 or Go2 on the network; faults come from arguments and standard input.
 
-use std::io::BufRead;
+use std::io::{BufRead, Read as _};
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -23,6 +23,9 @@ use quadfrog::sim::emulator::{self, Emulator, EmulatorFault, EmulatorHandle, Emu
 use super::arguments::{self, DdsArguments, RealRobot, load_model, one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
+
+/// Longest line of standard input that can be a fault, bytes.
+const LONGEST_LINE: u64 = 1024;
 
 /// Period of the status report.
 const REPORT_PERIOD: Duration = Duration::from_millis(200);
@@ -122,8 +125,16 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
 
 /// Applies faults from standard input until its end.
 fn read_faults(handle: &EmulatorHandle) {
-    // A line that is not UTF-8 is no fault, and not the last line.
-    for line in std::io::stdin().lock().split(b'\n').map_while(Result::ok) {
+    let (mut input, mut line) = (std::io::stdin().lock(), Vec::new());
+    while input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line).is_ok_and(|length| length > 0) {
+        if line.len() as u64 == LONGEST_LINE && !line.ends_with(b"\n") {
+            notice!("a line of more than {LONGEST_LINE} bytes is no fault");
+            if input.skip_until(b'\n').is_err() {
+                return;
+            }
+            line.clear();
+        }
+        // A line that is not UTF-8 is no fault, and not the last line.
         match String::from_utf8_lossy(&line).trim() {
             "" => {}
             "help" => put!("{}", emulator::help()),
@@ -135,6 +146,7 @@ fn read_faults(handle: &EmulatorHandle) {
                 Err(error) => notice!("{error}"),
             },
         }
+        line.clear();
     }
 }
 

@@ -127,12 +127,17 @@ fn list(folder: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let mut rows = vec![["study", "task", "seed", "trials", "counted", "falls", "best"].map(str::to_owned).to_vec()];
+    let mut unlisted = 0;
     for file in &files {
         // A study that cannot be read is reported, and the others are listed.
         let studies = stored_studies(&Storage::File(file.clone()));
+        unlisted += usize::from(studies.is_err());
         for stored in studies.inspect_err(|error| notice!("{error}")).unwrap_or_default() {
             match list_row(file, &stored) {
-                Err(failure @ Failure::Input(_)) => failure.print(),
+                Err(failure @ Failure::Input(_)) => {
+                    failure.print();
+                    unlisted += 1;
+                }
                 row => rows.push(row?),
             }
         }
@@ -144,7 +149,10 @@ fn list(folder: &Path) -> Result<(), Failure> {
         rows.iter_mut().for_each(|row| drop(row.drain(1..3)));
     }
     output::text(&table::aligned(&rows, |column| column == 0 || column == 1 && !are_named));
-    Ok(())
+    match unlisted {
+        0 => Ok(()),
+        unlisted => Err(Failure::input(format!("studies that cannot be read and are not listed: {unlisted}"))),
+    }
 }
 
 fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
