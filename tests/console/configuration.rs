@@ -123,6 +123,10 @@ fn a_configuration_of_the_user_that_cannot_be_read_is_refused() {
     assert_shows(&message, &["own/quadfrog cannot be read: ", "symbolic links"]);
     program.write("given/safety.toml", "[fall]\npitch_rad = 0.8\n");
     assert_eq!(run(&["config", "show", "--config", "given"]).0, Some(0));
+    // A user without a home has no configuration.
+    let mut homeless = program.command(&["config", "show"]);
+    homeless.env_remove("XDG_CONFIG_HOME").env("HOME", "/dev/null");
+    assert!(homeless.output().unwrap().status.success());
 }
 
 #[test]

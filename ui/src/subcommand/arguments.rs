@@ -123,7 +123,11 @@ fn given_or_user(given: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
 /// Whether a folder has a TOML file; not if there is no such folder.
 fn has_toml(folder: &Path) -> io::Result<bool> {
     let entries = match folder.read_dir() {
-        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(false),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        // The home of a service is none, as /dev/null.
+        Err(error) if error.kind() == ErrorKind::NotADirectory && folder.symlink_metadata().is_err() => {
+            return Ok(false);
+        }
         entries => entries?,
     };
     for entry in entries {
