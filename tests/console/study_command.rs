@@ -43,14 +43,14 @@ fn studies_are_listed_and_shown() {
     let best = program.text(&["study", "best", &format!("{study}/study.log")]);
     assert!(show.ends_with(&best), "{best}");
     // Regression: beside a journal that cannot be read the list ended as if it were complete.
-    std::fs::create_dir(program.path("recordings/other")).unwrap();
+    fs::create_dir(program.path("recordings/other")).unwrap();
     program.write("recordings/other/study.log", "no journal\nat all\n");
     let incomplete = program.run(&["study", "list"]);
     assert_eq!(incomplete.status.code(), Some(2));
     assert_eq!(String::from_utf8_lossy(&incomplete.stdout), list);
     let message = String::from_utf8_lossy(&incomplete.stderr);
     assert_shows(&message, &["recordings/other/study.log is no journal", "cannot be read and are not listed: 1"]);
-    std::fs::remove_dir_all(program.path("recordings/other")).unwrap();
+    fs::remove_dir_all(program.path("recordings/other")).unwrap();
     // Regression: "no study below a folder" was said of a folder whose folder holds some.
     let deeper = ["There is no study in . or directly below it; `quadfrog study list ./recordings` finds some"];
     assert_shows(&program.text(&["study", "list", "."]), &deeper);
