@@ -25,8 +25,7 @@ const ESTIMATE_FROM: f64 = 0.05;
 const BY_SIGNAL: i32 = 128;
 
 /// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to
-/// `interrupted`.
-/// The results do not depend on the number of threads.
+/// `interrupted`. The results do not depend on the number of threads.
 ///
 /// # Errors
 /// When a configuration or a study fails.
