@@ -110,6 +110,8 @@ fn studies_of_several_seeds_share_a_prior_and_equal_separate_runs() {
         (lines, String::from_utf8(output.stderr).unwrap())
     };
     let (together, said) = optimize("0-2", "together", "3");
+    // A wait is visible without a terminal, too.
+    assert!(said.contains("the prior of forward: 2 simulated robots, 16 jumps each, on "), "{said}");
     assert_eq!(said.matches("the prior of forward took").count(), 1, "{said}");
     assert_eq!(together.len(), 9);
     for seed in 0..3 {

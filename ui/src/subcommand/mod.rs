@@ -21,6 +21,7 @@ mod man;
 mod optimize;
 mod output_file;
 mod prior;
+mod progress;
 mod recover;
 mod rejudge;
 mod replay;
@@ -38,8 +39,9 @@ use crate::output;
 pub use arguments::VERSION;
 pub use completion::answer_shell;
 pub use failure::Failure;
+pub use progress::{minutes, seconds_left};
 use quadfrog::optimize::journal::notice_waits;
-pub use reproduce::{EXAMPLES, ExperimentConfiguration, minutes, seconds_left};
+pub use reproduce::{EXAMPLES, ExperimentConfiguration};
 
 /// Optimize the jumps of a quadruped, on the robot or on the built-in simulator.
 ///

@@ -1,21 +1,19 @@
 //! `quadfrog prior`: the prior of the sampler `sim`, made before a study.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use crate::{notice, output, put_line};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use clap_complete::ArgValueCandidates;
-use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::{PriorFileError, PriorMaker, ReadyPrior};
 use quadfrog::optimize::prior::World;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::cores;
-use quadfrog::session::prior::{PriorProgress, ensemble};
+use quadfrog::session::prior::ensemble;
+use quadfrog::sim::ensemble::EnsembleSettings;
 use quadfrog::trial::{Backend, Task};
 use serde_json::json;
 
@@ -23,6 +21,7 @@ use super::arguments::{self, whole_number};
 use super::completion;
 use super::failure::Failure;
 use super::output_file::{require_name, require_writable};
+use super::progress::Progress;
 
 #[derive(Debug, Args)]
 pub struct PriorArguments {
@@ -147,24 +146,11 @@ fn find_or_make(maker: &PriorMaker, files: &[PathBuf], kept: &Path, jobs: usize)
         return Ok(ready);
     }
     require_writable(kept, "give another place by --output")?;
-    let (begun, bar) = (Instant::now(), std::io::stderr().is_terminal().then(ProgressBar::no_length));
-    if let Some(bar) = &bar {
-        let style = ProgressStyle::with_template("prior of {msg} {bar:30} {pos}/{len} jumps, {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message(task);
-    }
-    let progress = |PriorProgress { total, .. }: PriorProgress| {
-        if let Some(bar) = &bar {
-            bar.set_length(total as u64);
-            bar.inc(1);
-        }
-    };
-    let made = maker.make(jobs, &progress, &AtomicBool::new(false));
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    let ready = made?;
-    notice!("the prior of {task} took {:.1} s", begun.elapsed().as_secs_f64());
+    let EnsembleSettings { worlds, points, .. } = maker.plan().ensemble;
+    notice!("the prior of {task}: {worlds} simulated robots, {points} jumps each, on {jobs} threads");
+    let progress = Progress::new(format!("prior of {task}"), u64::from(worlds) * u64::from(points), Some("jumps"));
+    let ready = maker.make(jobs, &|_| progress.add(1, ""), &AtomicBool::new(false))?;
+    notice!("the prior of {task} took {}", progress.finish());
     Ok(ready)
 }
 

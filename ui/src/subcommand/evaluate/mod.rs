@@ -3,14 +3,12 @@
 mod table;
 mod variant;
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::{notice, output};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
-use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::{Config, LEAST_F1_HZ};
 use quadfrog::engine::{EngineError, STUDY_FILE, newest_config, open_stored, stored_study};
 use quadfrog::optimize::study::Storage;
@@ -25,6 +23,7 @@ use serde_json::json;
 use super::arguments::{self, Seeds, each_once, load_config_for, load_model, parse_seeds, whole_number};
 use super::completion;
 use super::failure::Failure;
+use super::progress::Progress;
 use quadfrog::session::parallel::{cores, in_parallel};
 use variant::{Variant, on_off};
 
@@ -116,7 +115,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             runs.extend(arguments.seeds.0.iter().map(planned));
         }
     }
-    let progress = Progress::new(runs.len());
+    let (progress, falls) = (Progress::new("runs", runs.len() as u64, None), AtomicUsize::new(0));
     // A simulator of each variant for each thread, made when the thread needs it.
     let none = || Ok::<_, Failure>(simulators.iter().map(|_| None).collect::<Vec<_>>());
     let evaluate_run = |rollouts: &mut Vec<Option<Rollout<Simulator>>>, run: &PlannedRun| {
@@ -128,7 +127,9 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             }
         };
         let result = evaluate(rollout, &run.spec);
-        progress.count(&result);
+        let fell = usize::from(!result.stood());
+        let falls = falls.fetch_add(fell, Ordering::Relaxed) + fell;
+        progress.add(1, &format!("{falls} falls"));
         Ok(result)
     };
     let jobs = arguments.jobs.map_or_else(cores, usize::from);
@@ -199,41 +200,6 @@ fn simulators(arguments: &EvaluateArguments, config: &Config) -> Result<Vec<(Opt
         Ok((Some(friction), simulator))
     };
     each_once(&arguments.friction).iter().map(with).collect()
-}
-
-/// A progress bar on standard error, on a terminal.
-struct Progress {
-    bar: Option<ProgressBar>,
-    falls: AtomicUsize,
-}
-
-impl Progress {
-    fn new(runs: usize) -> Progress {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len} runs, {msg}, {eta} left");
-            ProgressBar::new(runs as u64)
-                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-                .with_message("0 falls")
-        });
-        Progress { bar, falls: AtomicUsize::new(0) }
-    }
-
-    fn count(&self, run: &EvaluatedRun) {
-        let fell = usize::from(!run.stood());
-        let falls = self.falls.fetch_add(fell, Ordering::Relaxed) + fell;
-        if let Some(bar) = &self.bar {
-            bar.set_message(format!("{falls} falls"));
-            bar.inc(1);
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
 }
 
 /// Returns the point of the arguments, else that of the configuration, and the gains with which it ran as the best trial of a study;

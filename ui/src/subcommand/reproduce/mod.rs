@@ -24,7 +24,6 @@ use self::results::ReproduceResults;
 use super::arguments::whole_number;
 use super::failure::{Failure, not_written};
 use super::output_file::{require_own, require_writable, write_text};
-pub use schedule::{minutes, seconds_left};
 
 /// Name of the results in the output folder.
 const RESULTS_FILE: &str = "results.json";

@@ -1,14 +1,10 @@
 //! Order of the work, progress with the time left, and the end by Ctrl-C.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 use crate::notice;
 use anyhow::anyhow;
-use indicatif::{ProgressBar, ProgressStyle};
 use nix::sys::signal::Signal;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::in_parallel;
@@ -18,9 +14,8 @@ use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
 use super::results::ReproduceResults;
 use super::work::{JobResult, Workplace};
 use crate::subcommand::failure::Failure;
+use crate::subcommand::progress::Progress;
 
-/// Share of the work after which the rate is known well enough for a time left.
-const ESTIMATE_FROM: f64 = 0.05;
 /// Exit status of a program that a signal ended, less the signal's number.
 const BY_SIGNAL: i32 = 128;
 
@@ -45,14 +40,16 @@ pub fn run_experiments(
         file: interrupted.to_owned(),
     });
     write_when_interrupted(Arc::clone(&kept))?;
-    let progress = JobProgress::new(&jobs, threads);
+    let studies = jobs.iter().filter(|job| matches!(job, ReproduceJob::Study(_))).count();
+    notice!("{studies} studies and {} runs on {threads} threads", jobs.len() - studies);
+    let progress = Progress::new("experiments", jobs.iter().map(ReproduceJob::cost).sum(), None);
     let (later, first): (Vec<&ReproduceJob>, Vec<&ReproduceJob>) = jobs.iter().partition(|job| job.depends());
     for mut stage in [first, later] {
         let studies = kept.lock().studies.clone();
         // The longest first: the threads then end together.
         stage.sort_by_key(|job| std::cmp::Reverse(job.cost()));
         let run = |(): &mut (), job: &&ReproduceJob| {
-            let result = workplace.run(job, &studies, |work| progress.add(work))?;
+            let result = workplace.run(job, &studies, |work| progress.add(work, ""))?;
             match result {
                 JobResult::Study(study) => kept.lock().studies.push(study),
                 JobResult::Run(run) => kept.lock().runs.push(*run),
@@ -66,7 +63,7 @@ pub fn run_experiments(
     for job in results.runs_to_trace() {
         results.traces.push(workplace.trace(&job)?);
     }
-    progress.finish();
+    notice!("the experiments took {}", progress.finish());
     Ok(results)
 }
 
@@ -129,48 +126,4 @@ fn write_when_interrupted(kept: Arc<KeptResults>) -> Result<(), Failure> {
     };
     std::thread::Builder::new().name("interrupt".to_owned()).spawn(wait).map_err(failed)?;
     Ok(())
-}
-
-/// Share of the work that is done, and the time left at the rate so far.
-struct JobProgress {
-    bar: ProgressBar,
-    done: AtomicU64,
-    all: u64,
-    begun: Instant,
-}
-
-impl JobProgress {
-    fn new(jobs: &[ReproduceJob], threads: usize) -> JobProgress {
-        let all = jobs.iter().map(ReproduceJob::cost).sum::<u64>().max(1);
-        let studies = jobs.iter().filter(|job| matches!(job, ReproduceJob::Study(_))).count();
-        notice!("{studies} studies and {} runs on {threads} threads", jobs.len() - studies);
-        let bar = if std::io::stderr().is_terminal() { ProgressBar::new(all) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{bar:30} {percent} %  {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        JobProgress { bar, done: AtomicU64::new(0), all, begun: Instant::now() }
-    }
-
-    fn add(&self, work: u64) {
-        let done = self.done.fetch_add(work, Ordering::Relaxed) + work;
-        self.bar.set_position(done.min(self.all));
-        if let Some(left_s) = seconds_left(done, self.all, self.begun.elapsed().as_secs_f64()) {
-            self.bar.set_message(format!("about {} left", minutes(left_s)));
-        }
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
-        notice!("the experiments took {}", minutes(self.begun.elapsed().as_secs_f64()));
-    }
-}
-
-/// Returns the time left at the rate so far, s; none before enough of the work is done.
-pub fn seconds_left(done: u64, all: u64, passed_s: f64) -> Option<f64> {
-    let share = done as f64 / all as f64;
-    (share >= ESTIMATE_FROM).then(|| passed_s * (1.0 - share).max(0.0) / share)
-}
-
-/// Returns a time in words: seconds below 90 s, minutes above.
-pub fn minutes(seconds: f64) -> String {
-    if seconds < 90.0 { format!("{:.0} s", seconds.ceil()) } else { format!("{:.1} min", seconds / 60.0) }
 }
