@@ -2,7 +2,7 @@
 //! the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `jobs`, `least_p_stand` and `fall_price` (left out: those of the task's configuration), `backend` (`sim` or
+//! `trials`, `seed`, `long_pairs` (studies of 100 jumps on each robot; 0: none), `jobs`, `least_p_stand` and `fall_price` (left out: those of the task's configuration), `backend` (`sim` or
 //! `hardware`, where the robots are controlled and judged by the estimate), `prior_backend` (left out: the same), `torque_limit` (a
 //! share for all robots; left out: drawn). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
 //!
@@ -33,8 +33,8 @@ use quadfrog::trial::{Backend, Task};
 
 use statistics::{mean, p_value};
 use studies::{
-    AFTER, Attainable, EARLY, Job, Jumper, KnownTask, LONG, LONG_PROPOSERS, LONG_SEEDS, NEAR, OPTIMUM_REPEATS,
-    Proposer, REACHED, REPEATS, StudyResult, Target, attainable, best_of, new_study, one_jump, run,
+    AFTER, Attainable, EARLY, Job, Jumper, KnownTask, LONG, LONG_PROPOSERS, LONG_SEED, NEAR, OPTIMUM_REPEATS, Proposer,
+    REACHED, REPEATS, StudyResult, Target, attainable, best_of, new_study, one_jump, run,
 };
 
 /// The robots: `count` - 3 from the ranges of the ensemble, the others outside of them; all with `torque_limit`, where it is given.
@@ -115,6 +115,7 @@ fn main() {
         ("studies", "20"),
         ("trials", "20"),
         ("seed", "9000"),
+        ("long_pairs", "4"),
         ("jobs", ""),
         ("least_p_stand", ""),
         ("fall_price", ""),
@@ -133,6 +134,7 @@ fn main() {
     let jobs = if settings["jobs"].is_empty() { cores() } else { number("jobs") };
     let (robots, studies, trials, seed) =
         (number("robots").max(4), number("studies"), number("trials"), number("seed"));
+    let long_pairs = number("long_pairs");
     let is_reached = |after: usize| AFTER[after] <= trials;
     let share = |key: &str| {
         let given = Some(&settings[key]).filter(|text| !text.is_empty());
@@ -167,7 +169,7 @@ fn main() {
         for target in 0..robots {
             let job = |proposer, study| Job { target, proposer, study, trials, is_long: false };
             let long = |seed| LONG_PROPOSERS.map(|proposer| Job { trials: LONG, is_long: true, ..job(proposer, seed) });
-            work.extend(LONG_SEEDS.flat_map(long));
+            work.extend((LONG_SEED..).take(long_pairs).flat_map(long));
             for &proposer in &proposers {
                 work.extend((0..studies as u32).map(|study| job(proposer, study)));
             }
@@ -224,16 +226,17 @@ fn main() {
             let at_best =
                 |(t, r): &&(usize, StudyResult)| r.best[..3].iter().any(|best| *best >= REACHED * judged[*t].0.optimum);
             let jumped = judged.iter().flat_map(|(_, early)| early).filter(|(of, early)| *of == proposer && *early);
-            let share = |count: usize| 100.0 * count as f64 / all.len() as f64;
+            let share = |count: usize| format!("{:.0} %", 100.0 * count as f64 / all.len() as f64);
+            let share_of_long = if long_pairs == 0 { String::new() } else { share(jumped.count()) };
             println!(
-                "| {} | {} | {} | {} | {} | {:.0} % | {:.0} % |",
+                "| {} | {} | {} | {} | {} | {} | {} |",
                 task.name,
                 proposer.name(),
                 values.join(" | "),
                 falls(2),
                 falls(4),
                 share(all.iter().filter(at_best).count()),
-                share(jumped.count())
+                share_of_long
             );
         }
         // The studies of a robot resemble each other: a robot is one observation.
@@ -261,10 +264,8 @@ fn main() {
         let is_there = |(proposer, after): (Proposer, usize)| proposers.contains(&proposer) && is_reached(after);
         notes.extend(pairs.iter().filter(|(a, b)| is_there(*a) && is_there(*b)).map(|(a, b)| compare(*a, *b)));
         for (target, (Attainable { optimum, long }, _)) in targets.iter().zip(&judged) {
-            eprintln!(
-                "{} {}: best known {optimum:.3}, of {LONG} jumps {long:.3}, {:?}",
-                task.name, target.name, target.properties
-            );
+            let of_long = if long_pairs == 0 { String::new() } else { format!(", of {LONG} jumps {long:.3}") };
+            eprintln!("{} {}: best known {optimum:.3}{of_long}, {:?}", task.name, target.name, target.properties);
         }
     }
     if !notes.is_empty() {

@@ -7,10 +7,10 @@
 Each study speaks with `quadfrog ask-tell`. Its robot is the Go1 of reference_landing.py with the controller of the paper, the motors of
 reference_motors.py, noise on joints and gyroscope, and a friction and a mass of its own, drawn with the study's seed. Contact, end and
 value of a jump are those of quadfrog's trials (config/control.toml). Prints a JSON line for each study: the value of the best trial after
-1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted; whether each jump stood, and with which probability
-the sampler `sim` expected it to. `--joints` gives the robots the rotors of the Go1, and dry and viscous friction of the joints drawn from
-the ranges of config/prior.toml. The task `continuous` is five jumps forward in a row, its value their mean length; `--config` is then a
-folder with that task, as examples/continuous without its first point. SI units, radians.
+1, 3, 5, 10 and 20 jumps, jumped three times with other noise, falls as 0 and counted; the point and value of each jump, null for a fall,
+and with which probability the sampler `sim` expected it to stand. `--joints` gives the robots the rotors of the Go1, and dry and viscous
+friction of the joints drawn from the ranges of config/prior.toml. The task `continuous` is five jumps forward in a row, its value their
+mean length; `--config` is then a folder with that task, as examples/continuous without its first point. SI units, radians.
 """
 
 import argparse
@@ -89,8 +89,9 @@ def study(program, task, sampler, seed, config, jumps, joints):
     talk.stdin.close()
     talk.wait()
     robot = dict(friction=robot.friction, mass=robot.mass, lag_s=robot.lag_s, full_torque_share=robot.full_torque_share)
-    after, stood = AFTER[: len(best)], [value is not None for _, value in trials]
-    return dict(task=task, sampler=sampler, seed=seed, after=after, best=best, falls=falls, stood=stood, p_stand=expected, robot=robot)
+    after, points, values = AFTER[: len(best)], [params for params, _ in trials], [value for _, value in trials]
+    found = dict(after=after, best=best, falls=falls, points=points, values=values, p_stand=expected)
+    return dict(task=task, sampler=sampler, seed=seed, **found, robot=robot)
 
 
 def main():
