@@ -2,7 +2,7 @@
 //!
 //! The value and the standing of the robot are learned about those of the ensemble ([`model`]); the next point maximizes the
 //! expected gain less the price of a fall ([`search`]). A simulator that the values contradict is left
-//! ([`safeguard`]). Without a prior, or with one of other parameters ([`PriorModel::covers`]), the sampler proposes as `gp`.
+//! ([`safeguard`]); with few jumps the study then begins over the whole space, as with `gp`. Without a prior, or with one of other parameters ([`PriorModel::covers`]), the sampler proposes as `gp`.
 
 pub mod history;
 pub mod insight;
@@ -14,14 +14,19 @@ pub mod worlds;
 
 use super::ask::{Ask, Candidate, Direction, Expectation, Prediction, Streams};
 use super::gp;
+use super::model_free;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
 use super::prior::terms::{CANDIDATES, Ensemble, Features};
 use super::sobol::Sobol;
+use super::space::Parameter;
 use history::{History, Jump};
 use libm::sqrt;
 use model::{StandingModel, ValueModel};
 use search::{Acquisition, PointPrediction};
+
+/// Points of the start over the whole space of which one is expected to stand.
+const TRIED: usize = 32;
 
 /// Proposes the next point for the given parameters.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
@@ -72,10 +77,13 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let search = SearchBox::of(ask, prior);
     let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
-    let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
+    let begins_anew = !models.1.has_worlds() && history.jumps.len() < ask.config.startup_trials(ask.space);
+    let candidates = if all_given || begins_anew { Vec::new() } else { search.candidates(prior, ensemble) };
     let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
+    } else if begins_anew {
+        (scattered(ask, prior, &acquisition, streams)?, true)
     } else {
         let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
         let worth = best.is_worth_the_risk();
@@ -83,7 +91,7 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     };
     let features = ensemble.features(prior.prior(), &unit);
     let prediction = acquisition.predict(&unit, &features);
-    let value = |p: &super::space::Parameter| {
+    let value = |p: &Parameter| {
         let at = prior.prior().parameters.iter().position(|known| known.name == p.name)?;
         let proposed = prior.prior().parameters[at].range.extrapolate(unit[at]);
         Some(ask.given(p).unwrap_or(proposed.clamp(p.range.low, p.range.high)))
@@ -91,6 +99,34 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
     let expected = Some(expectation(ask.direction, ensemble, &unit, &prediction, worth_the_risk));
     Some(Candidate { expected, ..Candidate::from(values) })
+}
+
+/// The next point over the whole space, as in the start of `gp`, whose probability of standing is accepted; of [`TRIED`] without one the
+/// surest. The few jumps so far were chosen by simulated robots that resemble this one in nothing, and far from them all points seem
+/// alike: a search would jump one corner of the space after the other. In the prior's unit cube.
+fn scattered(
+    ask: &Ask<'_>,
+    prior: &PriorModel,
+    acquisition: &Acquisition<'_>,
+    streams: &mut Streams,
+) -> Option<Vec<f64>> {
+    let mut surest: Option<(f64, Vec<f64>)> = None;
+    for _ in 0..TRIED {
+        let values = model_free::sobol(ask, streams).values;
+        let value = |known: &Parameter| {
+            let at = ask.space.parameters().iter().position(|p| p.name == known.name)?;
+            Some(known.range.scale(values[at]))
+        };
+        let unit = prior.prior().parameters.iter().map(value).collect::<Option<Vec<f64>>>()?;
+        let p_stand = acquisition.predict(&unit, &prior.features(&unit)?).p_stand;
+        if acquisition.accepts(p_stand) {
+            return Some(unit);
+        }
+        if surest.as_ref().is_none_or(|(most, _)| p_stand > *most) {
+            surest = Some((p_stand, unit));
+        }
+    }
+    surest.map(|(_, unit)| unit)
 }
 
 /// The prediction in the objective's unit and sign.
@@ -127,7 +163,7 @@ struct SearchBox {
 
 impl SearchBox {
     fn of(ask: &Ask<'_>, prior: &PriorModel) -> SearchBox {
-        let bound = |known: &super::space::Parameter| {
+        let bound = |known: &Parameter| {
             let searched = ask.space.parameters().iter().find(|p| p.name == known.name);
             let range = searched.map_or(known.range, |p| p.range);
             match searched.and_then(|p| ask.given(p)) {
