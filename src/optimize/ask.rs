@@ -76,7 +76,8 @@ pub struct SamplerConfig {
     /// Seed of the random streams.
     pub seed: u32,
     /// Finished trials before the model proposes; until then points are drawn over the whole space.
-    /// Default: 10 for TPE, as Optuna; the number of parameters plus two for the Gaussian process.
+    /// Default: 10 for TPE, as Optuna; the number of parameters plus two for the Gaussian process, and for `sim` where it leaves a wrong
+    /// simulator.
     pub startup_trials: Option<usize>,
     /// TPE: candidates drawn from l(x) for one proposal.
     pub candidates: usize,
