@@ -14,14 +14,21 @@ fn number(path: &Path) -> Option<u32> {
     }
 }
 
+/// Returns the folder of a recording and its number there: a later session has a higher number. None for a file with another name.
+pub fn place(path: &Path) -> Option<(&Path, u32)> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Some((folder, number(path)?))
+}
+
 /// Returns the name of a recording by its number.
 fn name(number: u32) -> String {
     if number == 1 { "session.mcap".to_owned() } else { format!("session-{number}.mcap") }
 }
 
-/// Returns the path of the next recording in a folder: the first free name after that of `last`, or of all.
+/// Returns the path of the next recording in a folder: the first free name after that of `last`, or after all.
 pub fn next_recording(folder: &Path, last: Option<&Path>) -> Option<PathBuf> {
-    let first = last.and_then(number).map_or(1, |number| number.saturating_add(1));
+    let last = last.and_then(number).or_else(|| number(recordings_in(folder).last()?));
+    let first = last.map_or(1, |number| number.saturating_add(1));
     let taken = |path: &PathBuf| path.exists() || path.with_extension("mcap.part").exists();
     (first..=u32::MAX).map(|number| folder.join(name(number))).find(|path| !taken(path))
 }

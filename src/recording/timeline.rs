@@ -1,12 +1,13 @@
 //! Recordings of one study as one: its files in the order of time, with their trials.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
 use super::player::{Damage, LostPart, Marker, MarkerKind, Played, Player};
 use super::record::{Record, SessionInfo, StageRecord, Stamped};
-use super::session_files::recordings_in;
+use super::session_files::{place, recordings_in};
 use crate::telemetry::Mode;
 use crate::trial::{ExperimentStage, Overrides, TrialRecord, Verdict};
 
@@ -89,9 +90,8 @@ impl Timeline {
     /// # Errors
     /// When a file cannot be played, or is of another study than the first one. Without a file.
     pub fn open(files: &[PathBuf]) -> Result<Timeline, RecordingError> {
-        let mut players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>()?;
-        players.sort_by_key(begin_utc_ns);
-        let mut players = players.into_iter();
+        let players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>()?;
+        let mut players = in_order(players).into_iter();
         let first = players.next().ok_or_else(|| RecordingError::NoRecording { path: PathBuf::new(), deeper: None })?;
         let mut timeline = Timeline::from(first);
         for player in players {
@@ -170,7 +170,7 @@ impl Timeline {
             for file in new {
                 // A file without its first record yet is opened at the next call.
                 let Ok(player) = Player::open(&file) else { continue };
-                if self.parts.last().is_some_and(|last| begin_utc_ns(&player) >= begin_utc_ns(&last.player)) {
+                if self.parts.last().is_some_and(|last| follows(&player, &last.player)) {
                     self.append(player)?;
                     news = true;
                 } else {
@@ -381,6 +381,36 @@ impl Iterator for Timeline {
 /// Returns the UTC time of a file's first message, ns since 1970.
 fn begin_utc_ns(player: &Player) -> u64 {
     player.start_utc_ns().saturating_add(player.first_ns())
+}
+
+/// Returns recordings in the order in which they were begun: those of a folder by their numbers, because a clock may have been set
+/// back between two sessions; those of several folders, and files with other names, by the time of their first message.
+pub fn in_order(players: Vec<Player>) -> Vec<Player> {
+    let mut folders: BTreeMap<PathBuf, Vec<Player>> = BTreeMap::new();
+    for player in players {
+        // A file with another name is by itself.
+        let group = place(player.path()).map_or(player.path(), |(folder, _)| folder).to_owned();
+        folders.entry(group).or_default().push(player);
+    }
+    for numbered in folders.values_mut() {
+        numbered.sort_by_key(|player| Reverse(place(player.path()).map(|(_, number)| number)));
+    }
+    let mut ordered = Vec::new();
+    // The last of each folder is its earliest that is left.
+    while let Some(next) =
+        folders.values_mut().filter(|left| !left.is_empty()).min_by_key(|left| left.last().map(begin_utc_ns))
+    {
+        ordered.extend(next.pop());
+    }
+    ordered
+}
+
+/// Whether a recording was begun after another, as in [`in_order`].
+fn follows(player: &Player, last: &Player) -> bool {
+    match (place(player.path()), place(last.path())) {
+        (Some((folder, number)), Some((of_last, last))) if folder == of_last => number > last,
+        _ => begin_utc_ns(player) >= begin_utc_ns(last),
+    }
 }
 
 /// Returns the name that a recording has once it is finished.

@@ -8,6 +8,8 @@ use std::process::{Command, Stdio};
 use crate::program::{Program, assert_shows, with_small_files, without_threads};
 use crate::skip::skip;
 use quadfrog::recording::player::{Played, Player};
+use quadfrog::recording::record::SessionInfo;
+use quadfrog::recording::writer::Writer;
 use quadfrog::telemetry::Tick;
 use serde_json::Value;
 
@@ -300,4 +302,21 @@ fn without_a_free_thread_the_table_is_the_same() {
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(fs::read(program.path(&with)).unwrap() == fs::read(program.path(&without)).unwrap(), "{file} differs");
     }
+}
+
+/// Regression: the files of a folder were exported in the order of the clock, which may be set back between two sessions.
+#[test]
+fn the_files_of_a_folder_are_exported_in_the_order_of_their_numbers() {
+    let program = Program::new();
+    fs::create_dir(program.path("study")).unwrap();
+    for (name, start_utc_ns, number) in [("session.mcap", 2_000_000_000, 1), ("session-2.mcap", 1_000_000_000, 2)] {
+        let path = program.path("study").join(name);
+        let mut writer = Writer::create(&path, &SessionInfo::default(), start_utc_ns, &[]).unwrap();
+        writer.tick(&Tick { number, ..Tick::default() }).unwrap();
+        writer.finish().unwrap();
+    }
+    let table = program.text(&["export", "study", "--topic", "/robot/tick"]);
+    let (header, rows) = csv(&table);
+    let number = header.iter().position(|name| *name == "number").unwrap();
+    assert_eq!(rows.iter().map(|row| row[number]).collect::<Vec<_>>(), ["1", "2"]);
 }

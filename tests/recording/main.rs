@@ -17,4 +17,5 @@ mod recorder;
 mod roundtrip;
 mod schema;
 mod speed;
+mod timeline;
 mod topic;
