@@ -1,6 +1,7 @@
 //! Copies of a file's events at its end: a reader lists the trials of a long recording without reading its chunks.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use prost::Message;
 
@@ -29,9 +30,15 @@ impl EventIndexBuilder {
         }
     }
 
-    /// Returns the channel and the log time of each event.
-    pub fn channels_and_times(&self) -> impl Iterator<Item = (u32, u64)> + '_ {
-        self.events.iter().map(|event| (event.channel, event.log_time))
+    /// Returns how often each event with a copy is there: channel, log time and data.
+    pub fn counted(&self) -> BTreeMap<(u32, u64, Vec<u8>), usize> {
+        let mut counts = BTreeMap::new();
+        for event in &self.events {
+            if let Some(data) = &event.data {
+                *counts.entry((event.channel, event.log_time, data.clone())).or_default() += 1;
+            }
+        }
+        counts
     }
 
     /// Returns the attachment that begins after `offset` bytes of the file, and forgets the events.

@@ -1,6 +1,6 @@
 //! Recovery of a recording that was not finished or is damaged.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -176,14 +176,19 @@ impl RecordCopier {
 
     /// Writes the events that only the copies at the end of the old file still have, the session's own among them.
     fn events_of_damaged_chunks(&mut self, copies: Vec<IndexedEvent>) -> Result<(), McapError> {
-        let written: BTreeSet<_> = self.out.events.channels_and_times().collect();
+        // Several events of a channel may have one time: the rows with which a continued session begins.
+        let mut written = self.out.events.counted();
         for (sequence, event) in (1..).zip(copies) {
             let IndexedEvent { topic, log_time, data: Some(data) } = event else { continue };
             let of_topic = self.channels.iter().find(|(_, (_, known))| *known == Some(topic));
             let Some((&channel_id, &(new_id, _))) = of_topic else { continue };
-            if !written.contains(&(new_id.into(), log_time)) {
-                let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
-                self.record(Record::Message { header, data: data.into() })?;
+            let event = (u32::from(new_id), log_time, data);
+            match written.get_mut(&event) {
+                Some(left) if *left > 0 => *left -= 1,
+                _ => {
+                    let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+                    self.record(Record::Message { header, data: event.2.into() })?;
+                }
             }
             if sequence % EVENTS_OF_A_CHUNK == 0 {
                 self.out.mcap.flush()?;

@@ -16,6 +16,7 @@ use quadfrog::recording::record::{Record, Stamped, Transition};
 use quadfrog::recording::recover::recover;
 use quadfrog::recording::writer::Writer;
 use quadfrog::telemetry::Mode;
+use quadfrog::trial::TrialRecord;
 use support::*;
 
 /// A study of 4 s: the bytes of its file before and after finishing, and its content.
@@ -623,4 +624,31 @@ fn an_event_that_is_too_large_for_a_copy_is_read_from_its_chunk() {
         _ => None,
     });
     assert!(player.events()[1..].iter().eq(events), "each once, in the order of time");
+}
+
+/// Regression: of several events of one channel and one time, such as the rows of a continued session, `recover` wrote none that only
+/// the copies had.
+#[test]
+fn events_of_one_time_in_a_damaged_chunk_are_recovered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("whole.mcap");
+    let mut writer = Writer::create(&path, &session(), START_UTC_NS, &[]).unwrap();
+    for trial in [0, 1, 2, 2] {
+        let row = TrialRecord { trial, ..TrialRecord::default() };
+        writer.record(&Stamped { time_ns: 1_000 * MS, record: Record::Trial(row) }).unwrap();
+        writer.flush().unwrap();
+    }
+    writer.finish().unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    let mut chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
+    bytes[(chunks[3].chunk_start_offset + chunks[3].chunk_length - 8) as usize] ^= 0x55;
+    let path = file(folder.path(), "session.mcap", &bytes);
+    let mut player = Player::open(&path).unwrap();
+    player.by_ref().for_each(drop);
+    assert_eq!(player.lost().len(), 1);
+    let recovered = recover(&path).unwrap();
+    let again = Player::open(&recovered.path).unwrap();
+    assert_eq!(again.events().len(), 5, "the session's own and four rows");
+    assert_eq!(again.events(), player.events());
 }
