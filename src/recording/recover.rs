@@ -207,7 +207,9 @@ impl RecordCopier {
             (unknown_messages > 0)
                 .then(|| format!("{} of unknown channels and left out", counted_are(unknown_messages, "message"))),
         ];
-        let lost: Vec<_> = container.cut.clone().into_iter().chain(damaged.into_iter().flatten()).collect();
+        // A missing index is made anew.
+        let cut = container.cut.clone().filter(|_| container.lacks_data_at_its_end());
+        let lost: Vec<_> = cut.into_iter().chain(damaged.into_iter().flatten()).collect();
         (!lost.is_empty()).then(|| lost.join("; "))
     }
 

@@ -652,3 +652,14 @@ fn events_of_one_time_in_a_damaged_chunk_are_recovered() {
     assert_eq!(again.events().len(), 5, "the session's own and four rows");
     assert_eq!(again.events(), player.events());
 }
+
+/// Regression: of a file that lacked nothing but its index the copy said that it was not whole.
+#[test]
+fn a_recording_that_lacks_its_index_alone_is_recovered_whole() {
+    let Whole { finished, everything, .. } = whole();
+    let folder = tempfile::tempdir().unwrap();
+    let recovered = recover(file(folder.path(), "session.mcap", &finished[..finished.len() - 1])).unwrap();
+    assert_eq!(recovered.lost, None);
+    assert_eq!(Player::open(&recovered.path).unwrap().lost_before_recovery(), Vec::<String>::new());
+    assert_equal(&play_damaged(&recovered.path).unwrap().0, everything);
+}
