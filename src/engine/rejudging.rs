@@ -123,8 +123,7 @@ impl Rejudging {
         let settings = config.settings(&robot, task, backend)?;
         let recorded = match attached_config(recording.first_player()) {
             Ok(config) => config.settings(&robot, task, backend).ok(),
-            Err(VerifyError::Recording(error)) => return Err(error.into()),
-            // That of an older version may be missing, or not valid any more.
+            // It may be damaged; that of an older version may be missing, or not valid any more.
             Err(_) => None,
         };
         let estimation = |s: &ControlSettings| (s.estimator, s.objective, s.contact_force_n);

@@ -133,3 +133,14 @@ fn a_recording_whose_robot_is_damaged_is_not_judged_by_another_one() {
     let refused = program.refused(&["rejudge", "damaged.mcap"]);
     assert_shows(&refused, &["damaged.mcap: not judged again: its robot cannot be read", "Attachment CRC failed"]);
 }
+
+/// Regression: a damaged configuration, which is compared alone, ended the judgement.
+#[test]
+fn a_recording_whose_configuration_is_damaged_is_judged_with_a_new_estimate() {
+    let (program, study) = recorded();
+    let mut bytes = fs::read(study.join("session.mcap")).unwrap();
+    let at = bytes.windows(12).position(|bytes| bytes == b"control.toml").expect("an attachment");
+    bytes[at + 100] ^= 1;
+    fs::write(program.path("configuration.mcap"), bytes).unwrap();
+    assert_shows(&program.text(&["rejudge", "configuration.mcap"]), &["trial 5: the estimate is recomputed"]);
+}

@@ -653,6 +653,25 @@ fn events_of_one_time_in_a_damaged_chunk_are_recovered() {
     assert_eq!(again.events(), player.events());
 }
 
+/// Regression: an attachment after a damaged one was not found.
+#[test]
+fn a_damaged_attachment_hides_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let attached: [(&str, &str, &[u8]); 2] =
+        [("config.toml", "application/toml", b"kp = 400.0\n"), ("robot.toml", "application/toml", b"legs = 4\n")];
+    Writer::create(&path, &session(), START_UTC_NS, &attached).unwrap().finish().unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    let at = bytes.windows(10).position(|bytes| bytes == b"kp = 400.0").unwrap();
+    bytes[at] ^= 1;
+    let mut player = Player::open(file(folder.path(), "session.mcap", &bytes)).unwrap();
+    assert_eq!(player.attachment("robot.toml").unwrap().as_deref(), Some(&b"legs = 4\n"[..]));
+    // The damaged one may have had the name.
+    for name in ["config.toml", "nothing.toml"] {
+        assert!(player.attachment(name).unwrap_err().to_string().contains("CRC"), "{name}");
+    }
+}
+
 /// Regression: of a file that lacked nothing but its index the copy said that it was not whole.
 #[test]
 fn a_recording_that_lacks_its_index_alone_is_recovered_whole() {

@@ -243,15 +243,19 @@ impl Player {
     }
 
     /// Returns the bytes of an attached file, for example `config.toml`; none if no file has that name.
+    ///
+    /// # Errors
+    /// When no whole attachment has that name and one is damaged: it may be the one.
     pub fn attachment(&mut self, name: &str) -> Result<Option<Vec<u8>>, RecordingError> {
+        let mut damaged = None;
         for span in self.container.attachments.clone() {
-            let attachment =
-                self.container.read_attachment(span).map_err(|error| RecordingError::of_reading(&self.path, error))?;
-            if attachment.name == name {
-                return Ok(Some(attachment.data.into_owned()));
+            match self.container.read_attachment(span) {
+                Ok(attachment) if attachment.name == name => return Ok(Some(attachment.data.into_owned())),
+                Ok(_) => {}
+                Err(error) => damaged = damaged.or(Some(error)),
             }
         }
-        Ok(None)
+        damaged.map_or(Ok(None), |error| Err(RecordingError::of_reading(&self.path, error)))
     }
 
     /// Takes the chunks that the container has found since the last call.
