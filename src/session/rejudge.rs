@@ -23,6 +23,9 @@ pub struct Judgement {
     pub cause: String,
 }
 
+/// Longest time of a trial's ticks that may be missing at its begin and its end, s: two ticks.
+const MISSING_S: f64 = 0.002;
+
 impl Judgement {
     /// Returns the suggestion that a row holds.
     pub fn of(row: &TrialRecord) -> Judgement {
@@ -88,9 +91,12 @@ pub fn row_of_repeat(row: &TrialRecord, repeat: &RepeatRecord) -> TrialRecord {
 /// it ran and does not fall under `settings` has no verdict: what would have followed is not recorded. Of the other ends (stop,
 /// fault, rest) the recorded one holds.
 pub fn rejudge(row: &TrialRecord, ticks: &[Tick], rule: &ObjectiveRule, settings: &ControlSettings) -> Judgement {
-    let missing = ticks.windows(2).filter(|pair| pair[1].number != pair[0].number + 1).count();
-    if missing > 0 || ticks.is_empty() {
+    let is_whole = ticks.windows(2).all(|pair| pair[1].number == pair[0].number + 1);
+    let (Some(first), Some(last), true) = (ticks.first(), ticks.last(), is_whole) else {
         return Judgement::unknown("some of its ticks cannot be read".into());
+    };
+    if first.trial_time_s > MISSING_S {
+        return Judgement::unknown("its begin is not recorded".into());
     }
     let mut watch = FallWatch::default();
     let fall = ticks
@@ -101,6 +107,10 @@ pub fn rejudge(row: &TrialRecord, ticks: &[Tick], rule: &ObjectiveRule, settings
         let measured = objective::measure(rule, &ticks[..=index]);
         let (verdict, cause) = objective::suggest(&TrialEnd::Fell(cause));
         return Judgement::measured(measured, Some(verdict), cause);
+    }
+    let end_s = row.measured.as_ref().map_or(0.0, |measured| measured.end_s);
+    if last.trial_time_s + MISSING_S < end_s {
+        return Judgement::unknown("its end is not recorded".into());
     }
     let measured = objective::measure(rule, ticks);
     if objective::ended_at_rest(row) {

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use crate::precision::{PRECISION, assert_same};
 use crate::program::{Program, assert_shows};
+use crate::verify::{PARTS, copied};
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::telemetry::Tick;
 use serde_json::Value;
@@ -132,6 +133,31 @@ fn a_recording_whose_robot_is_damaged_is_not_judged_by_another_one() {
     fs::write(program.path("damaged.mcap"), bytes).unwrap();
     let refused = program.refused(&["rejudge", "damaged.mcap"]);
     assert_shows(&refused, &["damaged.mcap: not judged again: its robot cannot be read", "Attachment CRC failed"]);
+}
+
+/// Regression: from the ticks of a part of a trial a value and a verdict were computed, without a word.
+#[test]
+fn a_trial_without_its_end_or_its_begin_has_no_new_judgement() {
+    let (program, study) = recorded();
+    let cases: [(&str, fn(&Tick) -> bool, &str); 2] = [
+        ("no-end.mcap", |tick| tick.trial_time_s > 0.3, "its end is not recorded"),
+        ("no-begin.mcap", |tick| tick.trial_time_s < 0.3, "its begin is not recorded"),
+    ];
+    for (name, is_left_out, cause) in cases {
+        let change = |tick: Tick| (tick.trial != Some(2) || !is_left_out(&tick)).then_some(tick);
+        copied(&study.join("session.mcap"), program.path(name), &PARTS, change);
+        let rows = program.trials(&["rejudge", name, "--json"]);
+        for (row, whole) in rows.iter().zip(rejudged(study.join("config").to_str().unwrap())) {
+            if row["trial"] == 2 {
+                assert_eq!(row["new"]["verdict"], Value::Null, "{row}");
+                assert_eq!((&row["new"]["value"], &row["difference"]), (&Value::Null, &Value::Null));
+                assert_eq!(row["new"]["cause"], cause);
+            } else {
+                assert_same(&row["new"], &whole["new"], "");
+            }
+        }
+        assert_eq!(rows.len(), 6);
+    }
 }
 
 /// Regression: a damaged configuration, which is compared alone, ended the judgement.

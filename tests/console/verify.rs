@@ -11,7 +11,7 @@ use quadfrog::telemetry::Tick;
 use quadfrog::trial::Backend;
 
 /// Attachments from which a session is simulated again.
-const PARTS: [&str; 8] = [
+pub const PARTS: [&str; 8] = [
     "control.toml",
     "safety.toml",
     "optimize.toml",
@@ -23,7 +23,7 @@ const PARTS: [&str; 8] = [
 ];
 
 /// Copies a recording with the given attachments and with ticks changed by `change`; one without a result is left out.
-fn copied(from: &Path, to: PathBuf, parts: &[&str], mut change: impl FnMut(Tick) -> Option<Tick>) -> PathBuf {
+pub fn copied(from: &Path, to: PathBuf, parts: &[&str], mut change: impl FnMut(Tick) -> Option<Tick>) -> PathBuf {
     let mut player = Player::open(from).unwrap();
     let attached: Vec<_> = parts.iter().map(|name| (*name, player.attachment(name).unwrap().unwrap())).collect();
     let attachments: Vec<(&str, &str, &[u8])> =
