@@ -161,6 +161,11 @@ impl Rejudging {
         self.recording.damage()
     }
 
+    /// Returns what was lost already when the files were recovered from damaged ones, with their names.
+    pub fn lost_before_recovery(&mut self) -> Vec<String> {
+        self.recording.lost_before_recovery()
+    }
+
     /// Takes a tick; returns the trial that ended before it.
     fn take(&mut self, mut tick: Tick) -> Option<RejudgedTrial> {
         let present = &self.present;

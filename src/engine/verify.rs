@@ -28,6 +28,8 @@ pub enum Verification {
         ticks: u64,
         /// Trials that a person, a fault or a crash ended: nothing in the file repeats that.
         left_out: Vec<u32>,
+        /// Parts that were lost already when the file was recovered from a damaged one.
+        lost_before: Vec<String>,
     },
     /// A tick differs.
     Different(TickDifference),
@@ -143,7 +145,14 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     let compared = compare_trials(&mut player, &mut rollout, &config, task);
     // A damaged chunk is found while it is played; its missing ticks are no difference of the simulation.
     damaged(&player)?;
-    compared
+    let lost_before = player.lost_before_recovery();
+    match compared {
+        // Nor are ticks that were lost before the file was recovered.
+        Ok(Verification::Different(_)) if !lost_before.is_empty() => {
+            Err(refuse(format!("it was {}", lost_before.join("; it was "))))
+        }
+        compared => compared,
+    }
 }
 
 /// Compares the ticks of every trial with those of the simulation up to the first difference.
@@ -160,7 +169,7 @@ fn compare_trials(
     let mut present: Option<ExpectedTicks> = None;
     // The trial of the last tick that had one, compared or left out.
     let mut last = None;
-    for played in player {
+    for played in player.by_ref() {
         let Played::Tick(tick) = played else { continue };
         let Some(trial) = tick.trial else { continue };
         if last != Some(trial) {
@@ -199,7 +208,7 @@ fn compare_trials(
     if trials == 0 {
         return Err(VerifyError::NoTrial { path });
     }
-    Ok(Verification::Equal { trials, ticks, left_out })
+    Ok(Verification::Equal { trials, ticks, left_out, lost_before: player.lost_before_recovery() })
 }
 
 /// Returns the text of an attached file.

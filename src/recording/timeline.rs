@@ -310,6 +310,11 @@ impl Timeline {
         self.parts.iter().filter_map(cut).collect()
     }
 
+    /// Returns what was lost already when files were recovered from damaged ones, with their names.
+    pub fn lost_before_recovery(&mut self) -> Vec<String> {
+        self.parts.iter_mut().flat_map(|part| part.player.named_losses_before_recovery()).collect()
+    }
+
     /// Returns whether the last file was completed; one that is being written is not.
     pub fn is_complete(&self) -> bool {
         self.parts.last().is_some_and(|part| part.player.is_complete())

@@ -109,8 +109,7 @@ impl Recordings {
                 format!("{file}: trial {trial} has more than {MOST_TICKS_OF_A_ROLLOUT} ticks; the others are left out");
             self.damages.push(text);
         }
-        let lost_before = player.lost_before_recovery();
-        self.damages.extend(lost_before.into_iter().map(|lost| format!("{}: {lost}", player.path().display())));
+        self.damages.extend(player.named_losses_before_recovery());
         self.damages.extend(player.damage().map(|damage| damage.to_string()));
     }
 

@@ -329,3 +329,20 @@ fn a_session_that_was_quit_proposes_the_same_values_again() {
     session.wait_for(&["Trial #0 (operator)", "1.300 Hz", "88.00 N"]);
     quit(&mut session);
 }
+
+/// Regression: a recovered recording that lacks something was whole for every command but `replay --check` and `report`.
+#[test]
+fn what_was_lost_before_a_recovery_is_an_error_of_the_commands_that_use_the_rest() {
+    let program = Program::new();
+    cut(&program);
+    program.text(&["recover", "cut.mcap.part"]);
+    for arguments in
+        [&["export", "cut.mcap", "-o", "cut.csv"][..], &["rejudge", "cut.mcap"], &["screenshot", "cut.mcap"]]
+    {
+        let output = program.run(arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert_shows(&message, &["cut.mcap: recovered from a file that was not whole: it was cut off"]);
+    }
+    assert!(fs::read_to_string(program.path("cut.csv")).unwrap().lines().count() > 1000);
+}

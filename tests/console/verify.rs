@@ -172,4 +172,24 @@ fn damage_is_no_difference_of_the_simulation() {
     assert_eq!(status, Some(2), "{error}");
     assert_shows(&error, &["damaged.mcap: not verifiable: it is damaged", "1 of "]);
     assert!(!error.contains("in the simulation"), "{error}");
+    // Regression: once the file was recovered they were.
+    program.text(&["recover", "damaged.mcap"]);
+    let (status, _, error) = verified(&program, &program.path("damaged.recovered.mcap"));
+    assert_eq!(status, Some(2), "{error}");
+    assert_shows(&error, &["not verifiable: it was recovered from a file that was not whole: 1 of "]);
+    assert!(!error.contains("in the simulation"), "{error}");
+}
+
+/// Of a recording whose session was killed every trial that came to its own end is verified, and the loss of its end is reported.
+#[test]
+fn a_loss_before_a_recovery_is_reported_beside_equal_ticks() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "3", "--record", "all"]);
+    let bytes = std::fs::read(program.study("recordings").join("session.mcap")).unwrap();
+    std::fs::write(program.path("cut.mcap.part"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+    program.text(&["recover", "cut.mcap.part"]);
+    let (status, out, error) = verified(&program, &program.path("cut.mcap"));
+    assert_eq!(status, Some(0), "{error}");
+    assert_shows(&out, &["bit for bit"]);
+    assert_shows(&error, &["cut.mcap: recovered from a file that was not whole: it was cut off"]);
 }

@@ -116,6 +116,12 @@ impl Player {
         lost.map(|lost| format!("recovered from a file that was not whole: {lost}")).collect()
     }
 
+    /// Returns the lines of [`Player::lost_before_recovery`], each after the file's name.
+    pub fn named_losses_before_recovery(&mut self) -> Vec<String> {
+        let lost = self.lost_before_recovery();
+        lost.into_iter().map(|lost| format!("{}: {lost}", self.path.display())).collect()
+    }
+
     /// Returns the reason for which the end of the file is missing; none for a finished file.
     pub fn cut(&self) -> Option<&str> {
         self.container.cut.as_deref()

@@ -9,16 +9,33 @@ use super::failure::Failure;
 
 /// Fails for damaged recordings, with the text of [`damage_text`]; exit status 1.
 pub fn require_no_damage(damage: &[Damage], done: &str) -> Result<(), Failure> {
-    if damage.is_empty() { Ok(()) } else { Err(Failure::Other(anyhow!(damage_text(damage, done)))) }
+    require_whole(damage, Vec::new(), done)
+}
+
+/// Fails for damaged recordings, and for recovered ones that lack something; exit status 1. `lost_before` holds a line for each loss
+/// before a recovery, with the file's name.
+pub fn require_whole(damage: &[Damage], lost_before: Vec<String>, done: &str) -> Result<(), Failure> {
+    if damage.is_empty() && lost_before.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Other(anyhow!(text(&[lost_before, lines(damage)].concat(), done))))
 }
 
 /// Returns the damage of each file with the command that repairs it, then `done`: the use that the command makes of the rest.
 pub fn damage_text(damage: &[Damage], done: &str) -> String {
+    text(&lines(damage), done)
+}
+
+fn lines(damage: &[Damage]) -> Vec<String> {
     let line = |damage: &Damage| match damage.is_recoverable {
         true => format!("{damage}; `quadfrog recover {}` keeps what can be read", damage.path.display()),
         false => damage.to_string(),
     };
-    format!("{}\n  {done}", damage.iter().map(line).collect::<Vec<_>>().join("\n"))
+    damage.iter().map(line).collect()
+}
+
+fn text(lines: &[String], done: &str) -> String {
+    format!("{}\n  {done}", lines.join("\n"))
 }
 
 /// Removes the damage of files that are `written` by a session and lack nothing but their end. `cuts` are the missing ends of all

@@ -17,7 +17,7 @@ use quadfrog::trial::counted;
 
 use super::arguments::{one_of, whole_number};
 use super::completion;
-use super::damage::require_no_damage;
+use super::damage::require_whole;
 use super::failure::Failure;
 use super::output_file::write_file;
 use super::replay::{is_written, lacks_its_end_alone};
@@ -157,6 +157,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
             written => written.map_err(|error| Failure::Other(anyhow!("standard output: {error}")))?,
         },
     }
+    let lost_before = players.iter_mut().flat_map(Player::named_losses_before_recovery).collect();
     let is_in_progress =
         |player: &&Player| written.iter().any(|file| file.as_path() == player.path()) && lacks_its_end_alone(player);
     let (in_progress, others): (Vec<_>, Vec<_>) = players.iter().partition(is_in_progress);
@@ -165,7 +166,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
         notice!("{}: a session still writes it; it is exported up to {end_s:.3} s", player.path().display());
     }
     let damage: Vec<_> = others.iter().filter_map(|player| player.damage()).collect();
-    require_no_damage(&damage, "what can be read is exported")
+    require_whole(&damage, lost_before, "what can be read is exported")
 }
 
 /// Refuses a trial of which no tick is recorded.

@@ -12,7 +12,7 @@ use quadfrog::trial::Verdict;
 use serde_json::{Value, json};
 
 use super::arguments;
-use super::damage::require_no_damage;
+use super::damage::require_whole;
 use super::failure::Failure;
 
 #[derive(Debug, Args)]
@@ -49,7 +49,8 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
     } else {
         print(&results, rejudging.unit());
     }
-    require_no_damage(&rejudging.damage(), "a trial of which ticks are missing there is judged by what is left")
+    let lost_before = rejudging.lost_before_recovery();
+    require_whole(&rejudging.damage(), lost_before, "a trial of which ticks are missing there has no new judgement")
 }
 
 fn name(verdict: Option<Verdict>) -> &'static str {

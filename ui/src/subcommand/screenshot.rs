@@ -20,7 +20,7 @@ use quadfrog::trial::TrialRecord;
 
 use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
-use super::damage::{require_no_damage, without_present_ends};
+use super::damage::{require_whole, without_present_ends};
 use super::failure::Failure;
 use super::output_file::{require_format, write_file};
 use super::replay::{is_written, recorded_robot};
@@ -100,7 +100,7 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     let files = recordings_of(&arguments.file)?;
     let written: Vec<PathBuf> = files.iter().filter(|file| is_written(file)).cloned().collect();
     let mut recording = Timeline::open(&files)?;
-    let cuts = recording.cuts();
+    let (cuts, lost_before) = (recording.cuts(), recording.lost_before_recovery());
     let time_ns = match (arguments.trial, arguments.time) {
         (Some(trial), _) => end_of(trial, &recording)
             .map_err(|reason| Failure::input(format!("{}: {reason}", arguments.file.display())))?,
@@ -149,7 +149,7 @@ pub fn run(arguments: &ScreenshotArguments) -> Result<(), Failure> {
     }
     let mut damage = std::mem::take(&mut *feed.damage().lock().unwrap_or_else(PoisonError::into_inner));
     without_present_ends(&mut damage, &written, &cuts);
-    require_no_damage(&damage, "what can be read is drawn")
+    require_whole(&damage, lost_before, "what can be read is drawn")
 }
 
 fn show(model: &mut Model, feed: &mut Feed) {

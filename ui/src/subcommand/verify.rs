@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::put_line;
+use crate::{notice, put_line};
 use anyhow::anyhow;
 use clap::Args;
 use quadfrog::engine::{self, TickDifference, Verification, VerifyError};
@@ -56,7 +56,7 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
         error => VerifyFailure::Other(Failure::input(error)),
     })?;
     match verified {
-        Verification::Equal { trials, ticks, left_out } => {
+        Verification::Equal { trials, ticks, left_out, lost_before } => {
             put_line!(
                 "{file}: {} of {} are simulated again, every one the same bit for bit",
                 counted(ticks as usize, "tick"),
@@ -66,6 +66,9 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
                 let numbers = left_out.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
                 let (them, trials) = if left_out.len() == 1 { ("it", "trial") } else { ("them", "trials") };
                 put_line!("not compared, because a person, a fault or a crash ended {them}: {trials} {numbers}");
+            }
+            for lost in lost_before {
+                notice!("{file}: {lost}");
             }
             Ok(())
         }
