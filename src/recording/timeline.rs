@@ -383,11 +383,6 @@ impl Iterator for Timeline {
     }
 }
 
-/// Returns the UTC time of a file's first message, ns since 1970.
-fn begin_utc_ns(player: &Player) -> u64 {
-    player.start_utc_ns().saturating_add(player.first_ns())
-}
-
 /// Returns recordings in the order in which they were begun: those of a folder by their numbers, because a clock may have been set
 /// back between two sessions; those of several folders, and files with other names, by the time of their first message.
 pub fn in_order(players: Vec<Player>) -> Vec<Player> {
@@ -418,6 +413,11 @@ fn follows(player: &Player, last: &Player) -> bool {
     }
 }
 
+/// Returns the UTC time of a file's first message, ns since 1970.
+fn begin_utc_ns(player: &Player) -> u64 {
+    player.start_utc_ns().saturating_add(player.first_ns())
+}
+
 /// Returns the name that a recording has once it is finished.
 fn finished_name(path: &Path) -> PathBuf {
     if path.extension().is_some_and(|end| end == "part") { path.with_extension("") } else { path.into() }
@@ -439,7 +439,8 @@ fn trial_begin(marker: &Marker) -> Option<(u32, u64)> {
     }
 }
 
-fn rows_of<'a>(events: impl Iterator<Item = &'a Stamped>) -> BTreeMap<u32, TrialRecord> {
+/// Returns the newest row of each trial among events.
+pub fn rows_of<'a>(events: impl Iterator<Item = &'a Stamped>) -> BTreeMap<u32, TrialRecord> {
     let rows = events.filter_map(|event| match &event.record {
         Record::Trial(row) => Some((row.trial, row.clone())),
         _ => None,

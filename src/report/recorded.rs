@@ -1,15 +1,15 @@
 //! Recorded trials of a study, read from its recordings.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::jump::{JumpCurves, JumpQuantities};
 use crate::recording::player::{MOST_TICKS_OF_A_ROLLOUT, Played, Player};
 use crate::recording::record::{Record, Stamped};
-use crate::recording::timeline::ended_trial;
+use crate::recording::timeline::{ended_trial, rows_of};
 use crate::robot::description::RobotDescription;
 use crate::telemetry::Tick;
-use crate::trial::Overrides;
+use crate::trial::{Overrides, ParameterValues, TrialRecord};
 
 /// Time before the impulse from which curves are shown, s.
 const BEFORE_S: f64 = 0.1;
@@ -59,30 +59,54 @@ impl Recordings {
         let mut read = Recordings { files: files.to_vec(), ..Recordings::default() };
         for file in files {
             match Player::open(file) {
-                Ok(player) => read.play(player, robot),
+                Ok(player) => read.play(player, robot, &|_| true),
                 Err(error) => read.damages.push(error.to_string()),
             }
         }
         read
     }
 
-    fn play(&mut self, mut player: Player, robot: &RobotDescription) {
+    /// Adds a recording in another folder, which `named` trials of the study name: those of them whose recorded rows have the same
+    /// parameters. Under the same numbers it may have trials of another study; one that has no other trials is left out.
+    pub fn add(&mut self, file: &Path, named: &BTreeMap<u32, ParameterValues>, robot: &RobotDescription) {
+        let player = match Player::open(file) {
+            Ok(player) => player,
+            Err(error) => return self.damages.push(error.to_string()),
+        };
+        let rows = rows_of(player.events().iter());
+        let is_same = |row: &TrialRecord, parameters: &ParameterValues| {
+            let equal = |(name, value): &(String, f64)| row.parameters.get(name) == Some(*value);
+            row.parameters.len() == parameters.len() && parameters.iter().all(equal)
+        };
+        let is_of_study =
+            |trial| rows.get(&trial).zip(named.get(&trial)).is_some_and(|(row, parameters)| is_same(row, parameters));
+        if named.keys().any(|trial| is_of_study(*trial)) {
+            self.files.push(file.to_owned());
+            self.play(player, robot, &is_of_study);
+        }
+    }
+
+    /// Reads a recording, of its trials only those that are `of_study`.
+    fn play(&mut self, mut player: Player, robot: &RobotDescription, of_study: &dyn Fn(u32) -> bool) {
         self.programs.insert(player.session().program_version());
         self.operators.extend(player.session().operator_in_words());
-        self.with_ticks.extend(player.trials_with_ticks());
+        self.with_ticks.extend(player.trials_with_ticks().filter(|trial| of_study(*trial)));
         let mut ticks: Vec<Tick> = Vec::new();
         let (mut ended, mut too_long) = (BTreeSet::new(), BTreeSet::new());
         for played in player.by_ref() {
-            let tick = match played {
+            let mut tick = match played {
                 Played::Tick(tick) => tick,
                 Played::Record(Stamped { record, .. }) => {
-                    if let Record::Proposal(proposal) = &record {
+                    if let Record::Proposal(proposal) = &record
+                        && of_study(proposal.trial)
+                    {
                         self.overrides.take(proposal);
                     }
                     ended.extend(ended_trial(&record));
                     continue;
                 }
             };
+            tick.trial = tick.trial.filter(|trial| of_study(*trial));
             // In simulated time the rollouts of a trial with repeats abut.
             let another = |last: &Tick| last.trial != tick.trial || tick.trial_time_s < last.trial_time_s;
             if ticks.last().is_some_and(another) {

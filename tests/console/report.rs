@@ -369,3 +369,22 @@ fn unusable_input_is_refused_with_the_remedy() {
     assert!(program.refused(&["report", &study, "--trials", "worst"]).contains("last-fall"));
     program.refused(&["report"]);
 }
+
+/// Regression: an imported trial named the recording of its own study, whose ticks were shown under the numbers of this one.
+#[test]
+fn ticks_of_another_study_are_not_shown() {
+    let program = Program::new();
+    let record = ["--trials", "2", "--record", "all", "--output"];
+    let run = |more: &[&str]| drop(program.text(&[&["optimize"], &record[..], more].concat()));
+    run(&["workers", "--task", "forward", "--seed", "9", "--join", "shared.log"]);
+    assert_eq!(column(table(&page(&program, &["shared.log"]), "Trials of"), "ticks"), ["yes"; 2]);
+    program.text(&["study", "export", "shared.log", "-o", "trials.csv"]);
+    program.text(&["optimize", "--trials", "3", "--seed", "1", "--record", "none"]);
+    let study = program.study("recordings").to_str().unwrap().to_owned();
+    assert!(program.text(&["study", "import", &study, "trials.csv"]).starts_with("2 trials"));
+    assert_shows(&program.text(&["report", &study]), &["No recording of this study exists"]);
+    // A journal of an earlier version, and another recording in the place of that of a worker.
+    run(&["others", "--seed", "4"]);
+    fs::copy(program.study("others").join("session.mcap"), program.study("workers").join("session.mcap")).unwrap();
+    assert_shows(&program.text(&["report", "shared.log"]), &["No recording of this study exists"]);
+}

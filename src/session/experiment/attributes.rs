@@ -269,9 +269,10 @@ impl TrialAttributes {
     }
 }
 
-/// Returns the attributes that hold in another study, too: without numbers of trials and workers, without a re-run.
+/// Returns the attributes that hold in another study, too: without numbers of trials and workers, without the recording, in which the
+/// trial has the number of its own study, and without a re-run.
 pub fn elsewhere(mut attributes: Map<String, Value>) -> Map<String, Value> {
-    for name in ["parent", "worker", "backend", "rerun", "interrupted"] {
+    for name in ["parent", "worker", "backend", "recording", "rerun", "interrupted"] {
         attributes.remove(name);
     }
     // A table has no types: a text of digits is a number there.

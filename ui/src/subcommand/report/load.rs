@@ -1,6 +1,6 @@
 //! Studies of a place with their recordings and configuration.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
@@ -13,7 +13,7 @@ use quadfrog::report::recorded::Recordings;
 use quadfrog::report::study::{ReportedStudy, limits_of};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::session::experiment::fixed_in_words;
-use quadfrog::trial::{Backend, PredictedTrial};
+use quadfrog::trial::{Backend, ParameterValues, PredictedTrial, TrialRecord};
 use serde_json::Value;
 
 use crate::subcommand::failure::Failure;
@@ -82,7 +82,11 @@ fn reported(
     let configured = control.map(|control| control.gains().values()).unwrap_or_default();
     let best = opened.best(&rows);
     let recordings = match &robot {
-        Some(robot) => read(&recordings(opened, folder), robot),
+        Some(robot) => {
+            let own = folder.map_or_else(Vec::new, recordings_in);
+            let elsewhere = elsewhere(opened, &rows, &own);
+            read(&own, &elsewhere, robot)
+        }
         None => Recordings::default(),
     };
     let backend = study.attributes().get("backend").and_then(Value::as_str).and_then(|name| name.parse().ok());
@@ -115,10 +119,14 @@ fn reported(
     })
 }
 
-/// Reads recordings; what a session still writes is not damaged by having no end.
-fn read(files: &[PathBuf], robot: &RobotDescription) -> Recordings {
-    let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
-    let mut recordings = Recordings::read(files, robot);
+/// Reads the recordings in a study's folder, in the order of their sessions, then those that its trials name elsewhere; what a session
+/// still writes is not damaged by having no end.
+fn read(own: &[PathBuf], elsewhere: &NamedRecordings, robot: &RobotDescription) -> Recordings {
+    let written: Vec<&PathBuf> = own.iter().chain(elsewhere.keys()).filter(|file| is_written(file)).collect();
+    let mut recordings = Recordings::read(own, robot);
+    for (file, named) in elsewhere {
+        recordings.add(file, named, robot);
+    }
     for player in written.into_iter().filter_map(|file| Player::open(file).ok()).filter(lacks_its_end_alone) {
         let no_end = player.damage().map(|damage| damage.to_string());
         for damage in recordings.damages.iter_mut().filter(|damage| no_end.as_ref() == Some(*damage)) {
@@ -135,15 +143,21 @@ fn description(kept: Option<&Path>, name: &str) -> Option<RobotDescription> {
     own.or_else(|| RobotDescription::embedded(name).ok())
 }
 
-/// Returns the recordings in a study's folder in the order of their sessions, then those that its trials name elsewhere.
-fn recordings(opened: &Opened, folder: Option<&Path>) -> Vec<PathBuf> {
-    let named = opened.study.trials().iter().filter_map(|trial| trial.user_attributes.get("recording")?.as_str());
-    // A name without a folder is that of a file beside the journal.
-    let elsewhere: BTreeSet<PathBuf> = named.filter(|name| name.contains('/')).map(PathBuf::from).collect();
-    let mut all: Vec<PathBuf> = folder.map_or_else(Vec::new, recordings_in);
-    for path in elsewhere {
+/// Recordings with the parameters of the trials that name them, by number.
+type NamedRecordings = BTreeMap<PathBuf, BTreeMap<u32, ParameterValues>>;
+
+/// Returns the recordings that trials name and that are not among the study's `own`.
+fn elsewhere(opened: &Opened, rows: &[TrialRecord], own: &[PathBuf]) -> NamedRecordings {
+    let mut named = NamedRecordings::new();
+    for row in rows {
+        let trial = opened.study.trial(row.trial).ok();
+        let name = trial.and_then(|trial| trial.user_attributes.get("recording")?.as_str());
+        // A name without a folder is that of a file beside the journal.
+        let Some(path) = name.filter(|name| name.contains('/')).map(PathBuf::from) else { continue };
         let found = [path.clone(), path.with_extension("mcap.part")].into_iter().find(|path| path.is_file());
-        all.extend(found.filter(|path| !all.contains(path)));
+        if let Some(file) = found.filter(|file| !own.contains(file)) {
+            named.entry(file).or_default().insert(row.trial, row.parameters.clone());
+        }
     }
-    all
+    named
 }
