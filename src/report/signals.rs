@@ -316,6 +316,9 @@ impl Signals {
         self.battery("charge", |battery| battery.charge_percent);
         self.battery("voltage", |battery| battery.voltage_v);
         self.battery("current", |battery| battery.current_a);
+        for cell in 0..Battery::default().cell_v.len() {
+            self.battery(&format!("cell_{}", cell + 1), move |battery| battery.cell_v[cell]);
+        }
         self.add_truth();
         self.add("lateness_ns", |tick| i64::from(tick.stages.lateness_ns));
         self.add("read_ns", |tick| i64::from(tick.stages.read_ns));

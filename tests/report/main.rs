@@ -2,5 +2,6 @@
 
 mod configuration;
 mod pages;
+mod signals;
 mod study;
 mod ticks;

@@ -31,7 +31,9 @@ def cells_of(message, prefix=""):
             # The controller's torques are left out where they are those of the command.
             values = value or message.torque_command
             yield from ((f"{LISTS[field.name]}_{joint}", each) for joint, each in zip(LEGS, values))
-        elif field.name != "cell":
+        elif field.name == "cell":
+            yield from ((f"{name}_{number}", each) for number, each in enumerate(value, 1))
+        else:
             yield name, value
 
 
