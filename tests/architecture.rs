@@ -29,7 +29,7 @@ const ENGINE: [(&str, &[&str]); 13] = [
 
 /// Layers of the console, lowest first: a module uses modules of lower layers only.
 const CONSOLE: [&[&str]; 12] = [
-    &["action", "cell_encoder", "column", "series", "connection", "foreground", "wrap"],
+    &["action", "cell_encoder", "column", "series", "connection", "foreground", "whole_file", "wrap"],
     &["keymap", "output", "theme"],
     &["graphics"],
     &["settings", "message"],

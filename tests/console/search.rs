@@ -781,3 +781,22 @@ fn the_hop_envelope_is_shown_beside_the_proposal() {
     console.record(Record::Search(search((0.0, 150.0), None)));
     assert!(!console.screen(80, 24).contains("hop envelope"));
 }
+
+/// Regression: the tables were written in place, and an export that ended early left the beginning of a table.
+#[test]
+fn a_table_replaces_the_last_one_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut console = finished();
+    let study = folder.path().join("study.log").display().to_string();
+    console.record(Record::Session(SessionInfo { study, ..session() }));
+    let tables = ["trials.csv", "trials.md"].map(|name| folder.path().join(name));
+    for table in &tables {
+        std::fs::write(table, "the last one").expect("written");
+        std::fs::hard_link(table, table.with_extension("last")).expect("linked");
+        assert_eq!(export::table(&console.model, ExportedRows::All).expect("written"), tables[0]);
+        assert_eq!(std::fs::read_to_string(table.with_extension("last")).expect("read"), "the last one");
+        assert_ne!(std::fs::read_to_string(table).expect("read"), "the last one");
+        std::fs::remove_file(table.with_extension("last")).expect("removed");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 2, "nothing else is left");
+}

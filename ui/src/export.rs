@@ -1,5 +1,6 @@
 //! Files written beside the study on request: the trial table, and the best parameters as a configuration.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
@@ -9,9 +10,10 @@ use quadfrog::engine::newest_config;
 use crate::message::ExportedRows;
 use crate::model::Model;
 use crate::text;
+use crate::whole_file::write_whole;
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).map_err(|error| anyhow!("{}: {error}", path.display()))
+    write_whole(path, |to| to.write_all(text.as_bytes())).map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
 /// The folder of the study, or the working directory where that folder does not exist (a replay from elsewhere).

@@ -41,4 +41,5 @@ pub mod text;
 pub mod theme;
 pub mod update;
 pub mod view;
+mod whole_file;
 mod wrap;

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use crate::put_line;
+use crate::whole_file::write_whole;
 use clap::{Args, Command};
 use clap_mangen::Man;
 
 use super::failure::{Failure, not_written};
-use super::output_file::write_whole;
 
 #[derive(Debug, Args)]
 pub struct ManArguments {

@@ -1,13 +1,15 @@
 //! Files that commands write for their user: whole or not at all, and never over a file of another kind.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use crate::whole_file::write_whole;
+
 use super::failure::{Failure, not_written};
 
-/// Writes a file, as [`write_whole`]. A device or a pipe is written in place. An existing file is replaced only where its name, after
-/// links, ends in `.extension`: a journal, a recording or a script is none of the tables and pictures that commands write.
+/// Writes a file, as [`write_whole`]. An existing file is replaced only where its name, after links, ends in `.extension`: a journal, a
+/// recording or a script is none of the tables and pictures that commands write.
 ///
 /// # Errors
 /// As of [`require_place`], or when a file of another kind exists, before anything is written; when it cannot be written, with the
@@ -18,19 +20,13 @@ pub fn write_file(
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Failure> {
     require_place("--output", file)?;
-    // What does not exist, or leads nowhere, is written as it is named.
-    let place = fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
-    match fs::metadata(&place) {
-        Ok(about) if !about.is_file() => {
-            let opened = OpenOptions::new().write(true).open(&place);
-            opened.and_then(|opened| whole(opened, write)).map(drop).map_err(|error| not_written(file, &error))
-        }
-        Ok(_) if !has_extension(&place, extension) => Err(Failure::input(format!(
+    if fs::canonicalize(file).is_ok_and(|place| place.is_file() && !has_extension(&place, extension)) {
+        return Err(Failure::input(format!(
             "--output {}: the file exists and its name does not end in .{extension}; give another name or remove it",
             file.display()
-        ))),
-        _ => write_whole(&place, write).map_err(|error| not_written(file, &error)),
+        )));
     }
+    write_whole(file, write).map_err(|error| not_written(file, &error))
 }
 
 /// Refuses the name by which other programs write to standard output. `option` is the argument that gives it.
@@ -91,30 +87,6 @@ pub fn require_format(file: &Path, extensions: &[&str], contents: &str) -> Resul
 /// In capital letters or not.
 fn has_extension(file: &Path, extension: &str) -> bool {
     file.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
-}
-
-/// Writes a file under another name beside its place until it is complete, so that an error leaves what was there.
-///
-/// # Errors
-/// Those of the file system.
-pub fn write_whole(file: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let part = file.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let written = File::create(&part)
-        .and_then(|part| whole(part, write))
-        .and_then(|part| part.sync_all())
-        .and_then(|()| fs::rename(&part, file));
-    if written.is_err() {
-        // The error that is reported is that of the writing.
-        let _ = fs::remove_file(&part);
-    }
-    written
-}
-
-fn whole(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<File> {
-    let mut file = BufWriter::new(file);
-    write(&mut file)?;
-    file.into_inner().map_err(io::IntoInnerError::into_error)
 }
 
 /// Writes a text, as [`write_whole`].

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::configuration::ExperimentConfiguration;
 use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, RunJob, RunPoint, StudyJob};
-use crate::subcommand::output_file::write_whole;
+use crate::whole_file::write_whole;
 
 /// Largest file of results, bytes: more than ten times one of the whole size.
 const LARGEST_RESULTS: u64 = 1 << 27;
