@@ -20,7 +20,7 @@ fn after_number(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) 
     let mut text = String::new();
     for (name, value) in &row.parameters {
         let of = units.get(name).map_or("", String::as_str);
-        let _ = write!(text, "  {name} {value:.*} {of}", digits(of));
+        let _ = write!(text, "  {name} {} {of}", parameter_value(*value, of));
     }
     if let Some(value) = row.value.filter(|_| row.verdict == Some(Verdict::Accept)) {
         let _ = write!(text, "  {value:.3} {unit}");
@@ -175,7 +175,7 @@ pub fn table(rows: &[TrialRecord], best: Option<u32>, parameters: &[ParameterInf
         let mut cells = vec![format!("{asterisk}{}", row.trial)];
         for parameter in parameters {
             let value = row.parameters.get(&parameter.name);
-            cells.push(value.map_or_else(String::new, |v| format!("{v:.*}", digits(&parameter.unit))));
+            cells.push(value.map_or_else(String::new, |value| parameter_value(value, &parameter.unit)));
         }
         if expects {
             let cell = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
@@ -222,7 +222,11 @@ pub fn aligned(lines: &[Vec<String>], is_text: impl Fn(usize) -> bool) -> String
     text
 }
 
-/// Decimal places for a parameter of a unit.
-fn digits(unit: &str) -> usize {
-    if unit == "Hz" { 3 } else { 1 }
+/// A parameter's value as text, by its unit; of another program, without a unit, with six significant digits.
+fn parameter_value(value: f64, unit: &str) -> String {
+    match unit {
+        "" => six_digits(value),
+        "Hz" => format!("{value:.3}"),
+        _ => format!("{value:.1}"),
+    }
 }

@@ -606,3 +606,22 @@ fn a_table_on_a_full_disk_is_added_whole_or_not_at_all() {
     }
     assert!(program.text(&["study", "import", &study, "points.csv", "--queue"]).contains("60 points queued"));
 }
+
+/// Regression: parameters of another program, which have no unit, were rounded to one decimal: a rate of 0.00123 was 0.0.
+#[test]
+fn parameters_of_another_program_have_six_digits() {
+    let program = Program::new();
+    let distribution = r#"{\"name\": \"FloatDistribution\", \"attributes\": {\"step\": null, \"low\": 0.0, \"high\": 1.0, \"log\": false}}"#;
+    let journal = format!(
+        r#"{{"op_code":0,"worker_id":"a","study_name":"theirs","directions":[2]}}
+{{"op_code":4,"worker_id":"a","study_id":0,"datetime_start":"2026-01-01T00:00:00Z"}}
+{{"op_code":5,"worker_id":"a","trial_id":0,"param_name":"rate","param_value_internal":0.00123456789,"distribution":"{distribution}"}}
+{{"op_code":6,"worker_id":"a","trial_id":0,"state":1,"values":[0.5],"datetime_complete":"2026-01-01T00:00:01Z"}}
+"#
+    );
+    program.write("theirs.log", &journal);
+    for command in ["show", "best"] {
+        let best = program.text(&["study", command, "theirs.log"]);
+        assert_shows(&best, &["Best: trial 0  rate 0.00123457 "]);
+    }
+}
