@@ -255,6 +255,7 @@ fn no_foot_is_in_the_air_while_a_simulated_robot_is_placed() {
     let mut placed = |backend, contact: bool| {
         console.model.session.info.backend = Some(backend);
         let mut tick = tick(1_000, 0.0, Some((4, -2.0, Phase::Stance)));
+        tick.state.robot_time_ms = 1_000;
         tick.estimate.contact = [contact; 4];
         console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
         console.tick(tick);

@@ -1,10 +1,11 @@
 //! View Health: the history of temperature, battery, link and lateness.
 
 use crate::support::{Console, assert_shows, line_with, session, tick};
-use quadfrog::recording::record::Record;
+use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::robot::{Battery, LinkStatus};
-use quadfrog::telemetry::{Counters, RecentLateness, Snapshot};
+use quadfrog::telemetry::{Counters, RecentLateness, Snapshot, Tick};
+use quadfrog::trial::Backend;
 use quadfrog_console::message::Msg;
 
 /// Ten minutes of a robot: a tick a second, with the values of each second.
@@ -136,4 +137,45 @@ fn a_failed_recording_is_not_shown_as_running_and_offers_no_jump() {
         assert_shows(console.said(), &["g is not possible: the recording is not complete (session.mcap.part: File"]);
         assert!(console.model.dialog.is_none());
     }
+}
+
+/// Regression: the history went on with the last temperature and charge of a robot that was silent, as values of now.
+#[test]
+fn the_history_of_a_silent_robot_ends_with_its_last_state() {
+    let mut console = Console::new();
+    console.record(Record::Session(SessionInfo { backend: Some(Backend::Hardware), ..session() }));
+    let state = |time_ms: u64, robot_time_ms: u32| {
+        let mut tick = tick(time_ms, 0.0, None);
+        tick.state.robot_time_ms = robot_time_ms;
+        tick.state.motor_temperature_c = [45.0; 12];
+        tick.state.battery = Some(Battery { charge_percent: 80.0, ..Battery::default() });
+        tick
+    };
+    let headings = |console: &Console| {
+        let screen = console.screen(120, 40);
+        ["hottest motor", "battery", "lateness"].map(|name| line_with(&screen, name))
+    };
+    console.press(&["5", "t"]);
+    // A robot that has not answered yet.
+    console.tick(Tick { time_ns: 0, ..Tick::default() });
+    assert_shows(&headings(&console)[0], &["hottest motor no state from the robot", "battery no state from the robot"]);
+    (1..500).for_each(|second| console.tick(state(1000 * second, 1000 * second as u32)));
+    assert_shows(&headings(&console)[0], &["hottest motor 45.00 C", "battery 80.00 %"]);
+    let drawn =
+        |console: &Console| console.screen(120, 40).chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count();
+    let before = drawn(&console);
+    // In the second of the last state, and later.
+    for end_ms in [499_200, 510_000] {
+        (499_005..=end_ms).step_by(5).for_each(|time_ms| console.tick(state(time_ms, 499_000)));
+        let [motor, battery, lateness] = headings(&console);
+        assert_shows(&motor, &["hottest motor no state from the robot"]);
+        assert_shows(&battery, &["battery no state from the robot"]);
+        assert_shows(&lateness, &["lateness 0.000 ms"]);
+        // What it sent before stays.
+        assert!(drawn(&console) > before / 2, "{}", console.screen(120, 40));
+    }
+    let newest = console.model.health_history.seconds().next_back().copied().expect("a second");
+    assert!(newest.motor_c.is_nan() && newest.battery_percent.is_nan(), "{newest:?}");
+    console.tick(state(510_005, 510_005));
+    assert_shows(&headings(&console)[0], &["hottest motor 45.00 C", "battery 80.00 %"]);
 }

@@ -655,6 +655,7 @@ fn hardware_is_armed_by_a_typed_confirmation() {
 fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
     let mut console = on_hardware(Vec::new());
     let mut newest = tick(5_000, 0.0, None);
+    newest.state.robot_time_ms = 5_000;
     newest.state.motor_temperature_c[5] = 63.0;
     let battery = Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] };
     newest.state.battery = Some(battery);
@@ -669,6 +670,7 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
         ..LinkStatus::default()
     };
     let counters = Counters { link: Some(link), ..Counters::default() };
+    console.tick(newest);
     console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, ..Snapshot::default() })));
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for view in View::VARIANTS.iter().copied() {
@@ -694,10 +696,12 @@ fn the_frame_says_how_link_battery_and_the_hottest_motor_are_at_every_size() {
 fn health_is_coloured_by_the_limits_of_the_session() {
     let mut console = on_hardware(Vec::new());
     let mut newest = tick(5_000, 0.0, None);
+    newest.state.robot_time_ms = 5_000;
     newest.state.motor_temperature_c[5] = 63.0;
     newest.state.battery = Some(Battery { charge_percent: 87.0, voltage_v: 24.1, current_a: -2.0, cell_v: [3.4; 10] });
     let link = LinkStatus { state_age_ms: 8, rate_hz: 998, recent_received: 5_000, ..LinkStatus::default() };
     let counters = Counters { link: Some(link), ..Counters::default() };
+    console.tick(newest);
     console.update(Msg::Snapshot(Box::new(Snapshot { tick: newest, counters, ..Snapshot::default() })));
     console.model.view = View::Health;
     let mut marked = |limits: HealthLimits| {

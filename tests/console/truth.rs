@@ -177,6 +177,43 @@ fn a_silent_robot_has_no_values() {
     shows(&mut console, true);
 }
 
+/// Regression: after STOP the values of a robot that had never answered were shown as measured: zeros.
+#[test]
+fn a_robot_that_never_answered_has_no_values_after_a_stop() {
+    for mode in [Mode::Damped, Mode::Fault] {
+        let mut console = hardware();
+        let without_state = |time_ms: u64| Tick { time_ns: time_ms * 1_000_000, mode, ..Tick::default() };
+        (0..300).step_by(5).for_each(|time_ms| console.tick(without_state(time_ms)));
+        let tick = without_state(295);
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+        for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+            console.press(&["1"]);
+            let live = console.screen(columns, rows);
+            assert_shows(&live, &["roll - rad", "foot z  - m"]);
+            assert!(!live.contains("+0.000"), "{live}");
+            // The panel of the joints.
+            assert_eq!(live.contains("no state from the robot"), columns > 80, "{live}");
+            console.press(&["5"]);
+            let health = console.screen(columns, rows);
+            assert_shows(&health, &["no state from the robot", "battery      -"]);
+            assert!(!health.contains("FR_hip") && !health.contains("none"), "{health}");
+        }
+    }
+    // The clock of the robot wraps after 49.7 days, a simulated robot is heard from its begin, and an old recording has no clock.
+    let mut wrapped = hardware();
+    wrapped.tick(state_of(5, u32::MAX, Mode::Ready));
+    wrapped.tick(state_of(10, 0, Mode::Ready));
+    let mut simulated = Console::ready();
+    (0..300).step_by(5).for_each(|time_ms| simulated.tick(state_of(time_ms, 0, Mode::Ready)));
+    let mut replay = hardware();
+    replay.update(Msg::Replay(ReplayStatus::default()));
+    (0..300).step_by(5).for_each(|time_ms| replay.tick(state_of(time_ms, 0, Mode::Ready)));
+    for console in [wrapped, simulated, replay] {
+        assert_shows(&console.screen(120, 40), &["roll +0.100 rad"]);
+        assert!(!console.screen(120, 40).contains("no state from the robot"));
+    }
+}
+
 /// Regression: battery and restarts had no room at 80x24 and at 120x40, and long values ended with two dots.
 #[test]
 fn health_of_a_robot_is_whole_at_every_size() {

@@ -29,15 +29,17 @@ pub struct HealthHistory {
 }
 
 impl HealthHistory {
-    /// Adds one tick, with the counters of its time. A tick older than the newest second clears the history first.
-    pub fn push(&mut self, tick: &Tick, counters: &Counters) {
-        let state = &tick.state;
-        let hottest = state.motor_temperature_c.iter().copied().fold(0.0, f64::max);
+    /// Adds one tick, with the counters of its time; `silent`: the robot sends no states. A tick older than the newest second clears
+    /// the history first.
+    pub fn push(&mut self, tick: &Tick, counters: &Counters, silent: bool) {
+        // What a silent robot has sent last is no value of now.
+        let state = Some(&tick.state).filter(|_| !silent);
+        let hottest = state.map_or(0.0, |state| state.motor_temperature_c.iter().copied().fold(0.0, f64::max));
         let now = HealthSecond {
             second: tick.time_ns / 1_000_000_000,
             // A robot without sensors of temperature reports zero.
             motor_c: if hottest > 0.0 { hottest } else { f64::NAN },
-            battery_percent: state.battery.map_or(f64::NAN, |battery| battery.charge_percent),
+            battery_percent: state.and_then(|state| state.battery).map_or(f64::NAN, |battery| battery.charge_percent),
             state_age_ms: counters.link.map_or(f64::NAN, |link| f64::from(link.state_age_ms)),
             lateness_ms: f64::from(tick.stages.lateness_ns) / 1e6,
         };

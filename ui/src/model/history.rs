@@ -159,7 +159,7 @@ pub struct SignalHistory {
     kept: Option<u32>,
     /// The trial of the newest sample that has one.
     running: Option<u32>,
-    /// The robot's clock, ms, and when the newest state arrived, ns.
+    /// The robot's clock, ms, and when the newest state arrived, ns; zeros before the first state.
     state: (u32, u64),
 }
 
@@ -181,15 +181,20 @@ fn thinned(trace: &[ChartSample]) -> Option<Vec<ChartSample>> {
 }
 
 impl SignalHistory {
-    /// Appends one tick. A tick older than the newest one (a replay was rewound) clears the samples first.
-    pub fn push(&mut self, tick: &Tick) {
+    /// Appends one tick; `clocked`: every state has the time of the robot's clock. A tick older than the newest one (a replay was
+    /// rewound) clears the samples first.
+    pub fn push(&mut self, tick: &Tick, clocked: bool) {
         let mut sample = ChartSample::from(tick);
         let rewound = tick.time_ns < self.state.1;
         if tick.state.robot_time_ms != self.state.0 || rewound {
             self.state = (tick.state.robot_time_ms, tick.time_ns);
         }
-        // A recording without the robot's clock has zeros.
-        sample.heard &= self.state.0 == 0 || tick.time_ns - self.state.1 <= SILENT_NS;
+        let recent = tick.time_ns - self.state.1 <= SILENT_NS;
+        sample.heard &= match clocked {
+            true => recent && self.state != (0, 0),
+            // A recording without the robot's clock has zeros, and so has a simulated robot before its first step.
+            false => recent || self.state.0 == 0,
+        };
         if self.samples.back().is_some_and(|newest| newest.time_ns >= sample.time_ns) {
             self.samples.clear();
         }
@@ -234,7 +239,7 @@ impl SignalHistory {
     /// Adds the trace of a trial of an earlier session; one of this session stays.
     pub fn add_trace(&mut self, trial: u32, ticks: &[Tick]) {
         let mut earlier = SignalHistory::default();
-        ticks.iter().for_each(|tick| earlier.push(tick));
+        ticks.iter().for_each(|tick| earlier.push(tick, false));
         if let Some(trace) = earlier.traces.remove(&trial) {
             self.traces.entry(trial).or_insert(trace);
         }
@@ -276,9 +281,9 @@ impl SignalHistory {
         self.samples.range(start..)
     }
 
-    /// Whether the robot sends no state at the newest sample.
-    pub fn is_silent(&self) -> bool {
-        self.samples.back().is_some_and(|sample| !sample.heard)
+    /// Whether the robot sends no state at the newest sample; none without a sample.
+    pub fn is_silent(&self) -> Option<bool> {
+        self.samples.back().map(|sample| !sample.heard)
     }
 
     /// Time of the newest sample, ns; 0 without any.

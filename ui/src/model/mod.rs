@@ -293,7 +293,12 @@ impl Model {
 
     /// Whether the robot sends no states: what is known of it is of an earlier time, or nothing.
     pub fn robot_is_silent(&self) -> bool {
-        self.history.is_silent()
+        self.history.is_silent().unwrap_or(self.runs_real_robot())
+    }
+
+    /// Whether this console runs the session of a real robot.
+    pub fn runs_real_robot(&self) -> bool {
+        self.replay.is_none() && self.session.info.is_hardware()
     }
 
     /// The robot's mode, from the newest tick.

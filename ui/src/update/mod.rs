@@ -84,8 +84,8 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Storage(wait) => model.storage = wait,
         Msg::Tick(tick) => {
             model.jump_series.push(&tick);
-            model.history.push(&tick);
-            model.health_history.push(&tick, &model.snapshot.counters);
+            model.history.push(&tick, model.runs_real_robot());
+            model.health_history.push(&tick, &model.snapshot.counters, model.robot_is_silent());
         }
         Msg::Replay(status) => {
             beside::follow(model, &status);

@@ -6,7 +6,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 
 use super::chart::{TimeAxis, draw_time_axis};
 use super::dots::DotGrid;
-use super::draw::{cell_at, heading, number, truncate};
+use super::draw::{NO_STATE, cell_at, heading, number, truncate};
 use super::parameter_axes::AXIS;
 use crate::action::Action;
 use crate::model::Model;
@@ -26,6 +26,8 @@ struct HealthChart {
     /// Reason why there are no values.
     none: &'static str,
     value: fn(&HealthSecond) -> f64,
+    /// Whether the robot reports it.
+    reported: bool,
     /// The value from which it is no longer good.
     limit: f64,
     /// Least upper end of the vertical axis.
@@ -51,6 +53,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, alone: bool) {
             unit: "C",
             none: "the robot reports no temperatures",
             value: |second| second.motor_c,
+            reported: true,
             limit: limits.motor_c,
             top: 80.0,
             worse_above: true,
@@ -60,6 +63,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, alone: bool) {
             unit: "%",
             none: "the robot has no battery",
             value: |second| second.battery_percent,
+            reported: true,
             limit: limits.battery_percent,
             top: 100.0,
             worse_above: false,
@@ -69,6 +73,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, alone: bool) {
             unit: "ms",
             none: "SIM: no link",
             value: |second| second.state_age_ms,
+            reported: false,
             limit: f64::from(limits.state_age_ms),
             top: 10.0,
             worse_above: true,
@@ -78,6 +83,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model, alone: bool) {
             unit: "ms",
             none: "no tick yet",
             value: |second| second.lateness_ms,
+            reported: false,
             limit: limits.late_ms,
             top: 1.0,
             worse_above: true,
@@ -107,8 +113,13 @@ impl HealthChart {
         let axis = TimeAxis { mode: ChartMode::Sweep, window_ns: WINDOW_NS, newest_ns };
         let values = || seconds().map(|second| (self.value)(second)).filter(|value| value.is_finite());
         let newest = seconds().next_back().map(|second| (self.value)(second)).filter(|value| value.is_finite());
-        self.draw_heading(buffer, head, newest, theme);
-        if newest.is_none() {
+        let silent = self.reported && model.robot_is_silent();
+        self.draw_heading(buffer, head, newest, silent, theme);
+        // Of a silent robot the values stay that it sent before.
+        if silent && values().next().is_none() {
+            return;
+        }
+        if newest.is_none() && !silent {
             let text = truncate(self.none, usize::from(plot.width));
             buffer.set_string(plot.x, plot.y, text, theme.style(Role::Quiet));
             return;
@@ -147,14 +158,20 @@ impl HealthChart {
         draw_time_axis(buffer, times, &axis, None, theme);
     }
 
-    fn draw_heading(&self, buffer: &mut Buffer, area: Rect, newest: Option<f64>, theme: &Theme) {
+    fn draw_heading(&self, buffer: &mut Buffer, area: Rect, newest: Option<f64>, silent: bool, theme: &Theme) {
         let width = usize::from(area.width);
         let name = truncate(self.name, width);
         buffer.set_string(area.x, area.y, &name, theme.style(Role::SeriesA));
-        let Some(newest) = newest else { return };
-        let beyond = if self.worse_above { newest >= self.limit } else { newest <= self.limit };
-        let (role, mark) = if beyond { (Role::Warning, " !") } else { (Role::Text, "") };
-        let text = format!(" {} {}{mark}, limit {} {}", number(newest), self.unit, number(self.limit), self.unit);
+        let (role, text) = match newest {
+            _ if silent => (Role::Quiet, format!(" {NO_STATE}")),
+            None => return,
+            Some(newest) => {
+                let beyond = if self.worse_above { newest >= self.limit } else { newest <= self.limit };
+                let (role, mark) = if beyond { (Role::Warning, " !") } else { (Role::Text, "") };
+                let (unit, limit) = (self.unit, number(self.limit));
+                (role, format!(" {} {unit}{mark}, limit {limit} {unit}", number(newest)))
+            }
+        };
         let used = name.chars().count();
         let x = area.x + used as u16;
         buffer.set_string(x, area.y, truncate(&text, width.saturating_sub(used)), theme.style(role));
