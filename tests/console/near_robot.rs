@@ -1,6 +1,6 @@
 //! Safety of people near the robot: the first command, approvals on hardware, the countdown, an observer's STOP.
 
-use crate::support::{Console, assert_shows, session};
+use crate::support::{Console, assert_shows, session, tick};
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{LogLevel, Record, SessionInfo};
 use quadfrog::robot::LinkStatus;
@@ -233,4 +233,32 @@ fn a_silent_robot_whose_control_is_taken_is_sent_commands() {
     console.model.session.info = go2;
     console.mode(Mode::Offline);
     assert_eq!(console.next_step(), "Braking commands may be sent until the robot answers; it is then damped.");
+}
+
+/// Regression: of a robot that sent nothing it was shown that it followed an observer's STOP, from torques of zero.
+#[test]
+fn an_observers_stop_of_a_silent_robot_is_not_shown_as_followed() {
+    const UNKNOWN: &str = "STOP requested; no state shows whether the robot follows. Use the remote.";
+    let state_of = |time_ms, robot_time_ms, mode| {
+        let mut tick = Tick { mode, ..tick(time_ms, 0.0, None) };
+        tick.state.robot_time_ms = robot_time_ms;
+        tick
+    };
+    let shows = |observer: &Console, lead: &str| {
+        assert!(observer.next_step().starts_with(lead), "{}", observer.next_step());
+        assert_shows(observer.screen(80, 24).lines().last().unwrap_or_default(), &[lead]);
+    };
+    for mode in [Mode::Damped, Mode::Fault] {
+        let mut observer = on_hardware(Console::new());
+        observer.model.session.info.observe = true;
+        assert_eq!(observer.press(&["Space"]), [Effect::Stop]);
+        observer.mode(mode);
+        shows(&observer, UNKNOWN);
+        (0..300).step_by(5).for_each(|time_ms| observer.tick(state_of(time_ms, 0, mode)));
+        shows(&observer, UNKNOWN);
+        (300..600).step_by(5).for_each(|time_ms| observer.tick(state_of(time_ms, time_ms as u32, mode)));
+        shows(&observer, "STOP requested and followed: the joints are damped.");
+        (600..800).step_by(5).for_each(|time_ms| observer.tick(state_of(time_ms, 595, mode)));
+        shows(&observer, UNKNOWN);
+    }
 }

@@ -252,10 +252,13 @@ fn before_jump(model: &Model) -> NextStep {
     NextStep { short, ..step(lead, model, &[OVERRIDE, (Action::Skip, "skip"), UNDO, SIT_DOWN]) }
 }
 
-/// The effect of an observer's STOP, which another commander may counteract.
+/// The effect of an observer's STOP, which another commander may counteract, as far as the robot's states show it.
 fn observers_stop(model: &Model) -> NextStep {
     let key = model.keymap.key(Action::Acknowledge);
     let lead = match model.torque_against_stop() {
+        _ if model.robot_is_silent() => {
+            "STOP requested; no state shows whether the robot follows. Use the remote.".to_owned()
+        }
         Some((joint, torque)) => {
             let name = joint_name(joint);
             format!("NOT STOPPED: {name} holds {torque:.1} N m, another console commands. Use the remote.")
