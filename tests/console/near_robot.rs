@@ -262,3 +262,23 @@ fn an_observers_stop_of_a_silent_robot_is_not_shown_as_followed() {
         shows(&observer, UNKNOWN);
     }
 }
+
+/// Regression: below 60x20, where no question is drawn, `L` and `y` took control of a real robot.
+#[test]
+fn a_terminal_too_small_for_the_question_takes_no_control() {
+    let mut console = on_hardware(Console::new());
+    console.mode(Mode::Observe);
+    console.wait(1000);
+    console.update(Msg::Resize(50, 12));
+    assert_eq!(console.press(&["L"]), []);
+    assert_shows(console.said(), &["enlarge the terminal to 60x20: the question must be visible"]);
+    assert_eq!(console.press(&["y"]), []);
+    // The terminal shrinks under the question.
+    console.update(Msg::Resize(60, 20));
+    console.press(&["L"]);
+    assert_shows(&console.screen(60, 20), &["Take control?"]);
+    console.update(Msg::Resize(59, 20));
+    assert_eq!(console.press(&["y"]), []);
+    console.update(Msg::Resize(60, 20));
+    assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
+}

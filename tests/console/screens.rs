@@ -79,6 +79,23 @@ fn a_small_terminal_shows_mode_stop_and_the_size_needed() {
     }
 }
 
+/// Regression: below 60x20 no dialog was drawn, whose keys worked, nor what a stopped robot needs, nor that the numbers were old.
+#[test]
+fn a_small_terminal_shows_the_question_the_next_step_and_that_the_numbers_are_old() {
+    let mut console = Console::ready();
+    console.update(Msg::Resize(50, 12));
+    // Both keys are refused at this size.
+    assert!(!console.screen(50, 12).contains("Press g"), "{}", console.screen(50, 12));
+    console.press(&["q"]);
+    assert_shows(&console.screen(50, 12), &["Press y to quit. Any other key cancels."]);
+    console.press(&["Esc"]);
+    console.mode(Mode::Damped);
+    assert_shows(&console.screen(50, 12), &["k acknowledges"]);
+    assert!(!console.screen(50, 12).contains("OLD"));
+    console.hang(1200);
+    assert_shows(&console.screen(50, 12), &["OLD: nothing new for 1.2 s"]);
+}
+
 /// Too small for the views, the terminal still has room for a jump: the whole proposal, the answer and the next step.
 #[test]
 fn a_compact_terminal_shows_the_trial_the_answer_and_the_next_step_whole() {

@@ -6,7 +6,7 @@ use quadfrog::trial::{ExperimentStage, Proposal, TrialRecord, Verdict};
 use ratatui::layout::Size;
 
 use crate::action::{ACTIONS, Action, ActionGroup, ActionInfo};
-use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, MIN_COLUMNS, MIN_ROWS, areas, shows_trial};
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, MIN_COLUMNS, MIN_ROWS, areas, compact_areas, shows_trial};
 use crate::model::{Model, View};
 
 /// Whether an action is possible now; the reason if it is not.
@@ -185,6 +185,9 @@ fn may_take_control(model: &Model) -> Legality {
     may_request(model)?;
     require(model.session.info.is_hardware(), "the simulator is under control from the start")?;
     require(matches!(model.mode(), Mode::Offline | Mode::Observe), "this console commands the robot already")?;
+    let drawn = compact_areas(Size::from(model.size)).is_some();
+    let enlarge = format!("enlarge the terminal to {COMPACT_COLUMNS}x{COMPACT_ROWS}: the question must be visible");
+    require(drawn, &enlarge)?;
     let left_s = LISTENING_S - model.clock.as_secs_f64();
     require(left_s <= 0.0, &format!("listening to the robot for another {left_s:.1} s"))
 }

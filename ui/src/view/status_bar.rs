@@ -10,11 +10,13 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::draw::{clock, clock_ms, number, span, truncate, without_sign_of_zero};
+use super::next_step;
 use crate::action::Action;
 use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, message_rows, tabs};
 use crate::model::trials::BestValue;
 use crate::model::{Model, View};
 use crate::theme::Role;
+use crate::wrap::wrap;
 
 /// Age of the newest tick from which the numbers count as old, ms.
 const STALE_MS: u128 = 500;
@@ -240,9 +242,8 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         Some(observer) if observer.demanded > observer.stopped => part("", Role::Bad, "STOP NOT CONFIRMED".to_owned()),
         _ => {}
     }
-    let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
-    if age_ms > STALE_MS && model.replay.is_none() {
-        part("", Role::Bad, format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3));
+    if let Some(old) = old(model) {
+        part("", Role::Bad, old);
     }
     let gap = if narrow { "  " } else { "   " };
     let room = usize::from(width).saturating_sub(spans.iter().map(Span::width).sum());
@@ -260,6 +261,13 @@ fn condition(model: &Model, width: u16) -> Vec<Span<'static>> {
         spans.push(span(theme, role, value));
     }
     spans
+}
+
+/// The mark of the numbers of a live session whose ticks have stopped; none while they arrive.
+fn old(model: &Model) -> Option<String> {
+    let age_ms = model.clock.saturating_sub(model.snapshot_at).as_millis();
+    let stale = age_ms > STALE_MS && model.replay.is_none();
+    stale.then(|| format!("OLD: nothing new for {:.1} s", age_ms as f64 / 1e3))
 }
 
 fn warning(condition: bool) -> Role {
@@ -331,7 +339,14 @@ pub fn render_message(frame: &mut Frame, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(rows).style(model.theme.style(role)), area);
 }
 
-/// The reduced form on a terminal that is too small: mode, STOP, link, needed size.
+/// The question of the open dialog, or the next step; none of a step whose key needs a larger terminal.
+fn step_of_small(model: &Model) -> Option<String> {
+    let waits = matches!(model.mode(), Mode::Offline | Mode::Observe | Mode::Disarmed | Mode::Ready);
+    let energises = waits && model.replay.is_none() && model.session.under_review().is_none();
+    (model.dialog.is_some() || !energises).then(|| next_step::with_row(model, false).lead)
+}
+
+/// The reduced form on a terminal that is too small: mode, STOP, link, what the keys do, needed size.
 pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
     let theme = &model.theme;
     let keys = stop_keys(model);
@@ -347,6 +362,12 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
             false => Line::from(span(theme, Role::Quiet, "no robot to stop")),
         },
         Line::from(link),
+    ];
+    lines.extend(old(model).map(|old| Line::from(span(theme, Role::Bad, old))));
+    if let Some(step) = step_of_small(model) {
+        lines.extend(wrap(&Line::from(span(theme, Role::Key, step)), usize::from(area.width), 1));
+    }
+    lines.extend([
         Line::from(format!("terminal {}x{}", area.width, area.height)),
         Line::from(format!("needed {COMPACT_COLUMNS}x{COMPACT_ROWS}")),
         Line::from(span(
@@ -354,7 +375,7 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
             Role::Quiet,
             if model.can_stop() { "STOP works, no key arms or jumps" } else { "enlarge the terminal" },
         )),
-    ];
+    ]);
     // What a key was answered, or refused for.
     lines.extend(message_rows(model, area.width).into_iter().map(|row| row.style(theme.style(Role::Warning))));
     frame.render_widget(Paragraph::new(lines), area);
