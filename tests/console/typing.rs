@@ -6,8 +6,9 @@ use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
-use quadfrog::trial::{ExperimentStage, SearchStatus, SearchedParameter, Verdict};
+use quadfrog::trial::{Approval, ExperimentStage, SearchStatus, SearchedParameter, Verdict};
 use quadfrog_console::message::{Effect, Msg, ReplayCommand, ReplayStatus};
+use quadfrog_console::model::dialog::Dialog;
 use quadfrog_console::theme::Role;
 
 /// A finished study.
@@ -38,6 +39,43 @@ fn no_text_field_opens_while_the_robot_jumps() {
     console.mode(Mode::Settle);
     console.press(&["m"]);
     assert!(console.model.dialog.is_some());
+}
+
+/// Regression: the rule began a countdown over a half-written note: its next letter cancelled and dropped the note, and the letters
+/// behind it judged the trial.
+#[test]
+fn letters_of_a_note_that_a_countdown_overtakes_stay_letters() {
+    let mut console = Console::ready();
+    console.record(Record::Session(SessionInfo { approve: Approval::FallsOnly, ..session() }));
+    console.judged(1);
+    console.press(&["m"]);
+    console.enter("slid");
+    console.stage(ExperimentStage::Running, 1);
+    console.record(Record::Trial(trial(1, None, None)));
+    console.mode(Mode::Countdown);
+    assert_eq!(console.requests(&["v"]), [OperatorRequest::Cancel]);
+    console.record(Record::Trial(trial(1, None, Some(Verdict::Void))));
+    console.stage(ExperimentStage::Review, 1);
+    console.mode(Mode::Ready);
+    assert_eq!(console.requests(&["r"]), []);
+    assert_shows(&console.screen(80, 24), &["slidvr"]);
+    let text = "slidvr".to_owned();
+    assert_eq!(console.requests(&["Enter"]), [OperatorRequest::Note { trial: 0, text }]);
+    // A key that is no letter confirms and drops nothing.
+    for key in ["Enter", "Esc", "Backspace"] {
+        console.stage(ExperimentStage::Proposed, 2);
+        console.press(&["m"]);
+        console.mode(Mode::Countdown);
+        assert_eq!(console.requests(&[key]), [OperatorRequest::Cancel], "{key}");
+        assert!(console.model.dialog.as_ref().is_some_and(Dialog::takes_text), "{key}");
+        console.mode(Mode::Ready);
+        console.press(&["Esc"]);
+    }
+    // A question closes: its keys command.
+    console.press(&["q"]);
+    console.mode(Mode::Countdown);
+    assert_eq!(console.requests(&["y"]), [OperatorRequest::Cancel]);
+    assert!(console.model.dialog.is_none());
 }
 
 #[test]

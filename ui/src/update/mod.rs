@@ -135,9 +135,7 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
     }
     let looks = action.is_some_and(Action::opens_view) && view_keys_keep_countdown(model);
     if model.mode() == Mode::Countdown && may_request(model).is_ok() && !looks {
-        model.dialog = None;
-        drop_answer(model);
-        return request(model, OperatorRequest::Cancel);
+        return cancel_countdown(model, key);
     }
     if let Some(dialog) = model.dialog.take() {
         drop_answer(model);
@@ -152,6 +150,23 @@ fn press(model: &mut Model, key: Key) -> Vec<Effect> {
             let help = model.keymap.key(Action::Help);
             reply(model, LogLevel::Info, does_nothing(key, &format!("{help} shows the keys")));
             Vec::new()
+        }
+    }
+}
+
+/// Cancels a countdown with a key. A text that is half written stays open and takes the character of the key: the letters behind it
+/// would be commands. No text is confirmed or dropped, and any other dialog closes.
+fn cancel_countdown(model: &mut Model, key: Key) -> Vec<Effect> {
+    drop_answer(model);
+    let cancel = request(model, OperatorRequest::Cancel);
+    match model.dialog.take().filter(Dialog::takes_text) {
+        Some(dialog) if key.typed().is_some() => match dialog::key(model, dialog, key) {
+            KeyOutcome::Effects(effects) => [cancel, effects].concat(),
+            KeyOutcome::Perform(_) => cancel,
+        },
+        text => {
+            model.dialog = text;
+            cancel
         }
     }
 }
