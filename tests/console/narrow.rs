@@ -4,8 +4,9 @@ use crate::support::{Console, assert_shows, line_with, proposal, session, tick, 
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
-    Approval, ExperimentStage, FixedParameter, JudgedBy, ParameterInsight, PointRecord, ProposalInsight,
-    ProposalSource, QueuedPoint, REMOVED, SearchStatus, SearchedParameter, Task, TrialRecord, Verdict,
+    Approval, ExperimentStage, FallRisk, FixedParameter, JudgedBy, ParameterInsight, PointRecord, ProposalInsight,
+    ProposalSource, ProposedParameter, QueuedPoint, REMOVED, SearchStatus, SearchedParameter, Task, TrialRecord,
+    Verdict,
 };
 use quadfrog_console::message::Msg;
 
@@ -392,4 +393,30 @@ fn two_compared_trials_are_marked_as_the_charts_name_them() {
     let screen = console.screen(120, 40);
     assert_shows(&screen, &["Trials, A and B compared ", "   0A ", ">  1B ", "   2  "]);
     assert!(!screen.contains('~'), "{screen}");
+}
+
+/// Regression: at 80x24 the proposal lost its last lines without a mark: a changed gain, the falls near it, the hop envelope.
+#[test]
+fn a_proposal_at_80_columns_is_whole_or_says_what_has_no_room() {
+    let mut console = Console::ready();
+    console.judged(3);
+    let mut proposal = proposal(3, 1);
+    proposal.gains.iter_mut().for_each(|gain| gain.value += 1.0);
+    let (nearest_fall, nearest_fall_trial) = (Some(0.12), Some(1));
+    proposal.risk = Some(FallRisk { nearest_fall, nearest_fall_trial, falls: 1, neighbours: 3 });
+    console.record(Record::Proposal(proposal.clone()));
+    console.stage(ExperimentStage::Proposed, 3);
+    console.record(Record::Search(SearchStatus { budget: 20, hop_share: Some(0.4), ..SearchStatus::default() }));
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["f0", "Fx", "Fz", " kp ", " kd ", " kd_joint", " k_att", "nearest fall #1"]);
+    assert_shows(&screen, &["hop envelope: 40 % of force"]);
+    assert!(!screen.contains("no room"), "{screen}");
+    // More than the panel has room for.
+    let more = (0..6).map(|number| ProposedParameter { name: format!("p{number}"), value: 1.0, proposed: 1.0 });
+    proposal.parameters.extend(more);
+    proposal.revision = 2;
+    console.record(Record::Proposal(proposal));
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["p0", "p5", " 4 more have no room"]);
+    assert!(!screen.contains("hop envelope"), "{screen}");
 }

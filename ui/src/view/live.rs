@@ -75,7 +75,11 @@ fn places(area: Rect, model: &Model) -> Option<Places> {
     };
     let card_rows = match compared(model) {
         Some(comparison) => beside::rows(comparison).min(side.height),
-        None => card_rows(model, side.width).min(side.height.saturating_sub(5)),
+        // In a low terminal the objective gives rows to what is to be approved.
+        None => {
+            let usual = card_rows(model, side.width).min(side.height.saturating_sub(5));
+            usual.max(proposal::least_rows(model, side.width).min(side.height))
+        }
     };
     let room = side.height - card_rows;
     // Without room for both, the panel of the joints shows the robot and the others the objective.

@@ -17,15 +17,37 @@ use crate::legal::{legal, may_request};
 use crate::model::Model;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
-use crate::wrap::wrap_all;
+use crate::wrap::{wrap, wrap_all};
 
 pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let PanelText { title, lines, points } = content(model, usize::from(area.width));
     let body = heading(frame, area, &model.theme, &title, "");
-    let mut lines = wrap_all(&lines, usize::from(body.width), 1);
+    // A row at least says that the points have no room.
+    let rows = usize::from(body.height).saturating_sub(usize::from(!points.is_empty()));
+    let mut lines = within(&lines, &model.theme, usize::from(body.width), rows);
     let room = usize::from(body.height).saturating_sub(lines.len());
     lines.extend(points::within(points, &model.theme, 1, room));
     frame.render_widget(Paragraph::new(lines), body);
+}
+
+/// The lines in rows of `width` columns, as far as `rows` rows have room: whole lines, and the number of those that are left out.
+fn within(lines: &[Line], theme: &Theme, width: usize, rows: usize) -> Vec<Line<'static>> {
+    let whole = wrap_all(lines, width, 1);
+    if whole.len() <= rows {
+        return whole;
+    }
+    let mut shown = Vec::new();
+    for (index, line) in lines.iter().enumerate() {
+        let line = wrap(line, width, 1);
+        // A row names those that are left out.
+        if shown.len() + line.len() >= rows {
+            let sign = format!(" {} more have no room", lines.len() - index);
+            shown.push(Line::from(span(theme, Role::Warning, sign)));
+            break;
+        }
+        shown.extend(line);
+    }
+    shown
 }
 
 /// The text of the panel.
@@ -45,8 +67,19 @@ impl PanelText {
 
 /// The rows that the whole panel takes with that many columns.
 pub fn rows(model: &Model, width: u16) -> u16 {
+    let (lines, points) = rows_of_parts(model, width);
+    1 + lines + points
+}
+
+/// The same with one row for all of the repeated points, which says that they have no room.
+pub fn least_rows(model: &Model, width: u16) -> u16 {
+    let (lines, points) = rows_of_parts(model, width);
+    1 + lines + points.min(1)
+}
+
+fn rows_of_parts(model: &Model, width: u16) -> (u16, u16) {
     let PanelText { lines, points, .. } = content(model, usize::from(width));
-    1 + (wrap_all(&lines, usize::from(width), 1).len() + points.len()) as u16
+    (wrap_all(&lines, usize::from(width), 1).len() as u16, points.len() as u16)
 }
 
 fn content(model: &Model, width: usize) -> PanelText {
