@@ -7,7 +7,6 @@ use std::time::Duration;
 use crate::pty::{Session, Setup};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use quadfrog::recording::player::Player;
 use quadfrog::robot::description::RobotDescription;
@@ -18,6 +17,7 @@ use quadfrog_console::model::RobotFacts;
 use quadfrog_console::settings::ConsoleSettings;
 use quadfrog_console::theme::{Role, Theme, ThemeChoice};
 
+const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/console/session.mcap");
 const SIZE: (u16, u16) = (120, 40);
 const CELL: (u16, u16) = (10, 20);
 const COLOURS: (&str, &str) = ("COLORTERM", "truecolor");
@@ -163,7 +163,7 @@ fn pictures(bytes: &[u8]) -> Vec<Sent> {
 fn paused(arguments: &[&str], cell: (u16, u16), variables: &[(&str, &str)]) -> (tempfile::TempDir, Session) {
     let folder = tempfile::tempdir().expect("a folder");
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
-    command.args(["replay", concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/console/session.mcap")]);
+    command.args(["replay", RECORDING]);
     command.args(arguments);
     let mut session = Session::run_in(folder.path(), &Setup { size: SIZE, cell, variables }, command);
     session.wait_for(&["REPLAY"]);
@@ -318,16 +318,26 @@ fn pictures_without_identifiers_are_erased_with_their_cells() {
 
 #[test]
 fn suspending_and_a_panic_remove_the_picture() {
-    let (_folder, mut session) = kitty();
+    let folder = tempfile::tempdir().expect("a folder");
+    let setup = Setup { size: SIZE, cell: CELL, variables: &[COLOURS] };
+    let mut session = Session::shell(folder.path(), &setup);
+    session.send(&format!("{} replay {RECORDING} --graphics kitty\r", env!("CARGO_BIN_EXE_quadfrog")));
+    session.wait_for(&["REPLAY"]);
+    session.send("p");
+    session.wait_for(&["paused"]);
+    wait_for_picture(&session, 0);
     let from = session.bytes();
     session.send("\x1a");
-    session.wait_until("the terminal is given back", || session.restored() && session.cooked());
+    session.wait_for(&["Stopped"]);
     assert!(session.sent_after(from, REMOVES_KITTY));
     let from = session.bytes();
-    session.signal(Signal::SIGCONT);
+    session.send("fg\r");
     wait_for_picture(&session, from);
+    session.send("q");
+    session.wait_until("the prompt", || session.screen().trim_end().ends_with("shell>"));
+    session.send("exit\r");
+    session.wait();
 
-    let folder = tempfile::tempdir().expect("a folder");
     let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
     command.args([
         "--ignored",
@@ -335,7 +345,6 @@ fn suspending_and_a_panic_remove_the_picture() {
         "graphics::a_console_with_a_picture_one_of_whose_threads_panics",
         "--nocapture",
     ]);
-    let setup = Setup { size: SIZE, cell: CELL, variables: &[COLOURS] };
     let mut session = Session::run_in(folder.path(), &setup, command);
     session.wait_for(&["REPLAY"]);
     session.send("p");

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::pty::Session;
-use nix::sys::signal::Signal;
 use portable_pty::CommandBuilder;
 use quadfrog_console::action::{ACTIONS, Action};
 use quadfrog_console::settings::ConsoleSettings;
@@ -20,11 +19,9 @@ enum Seen {
     Changes,
     /// These bytes are sent.
     Sends(&'static [u8]),
-    /// The program restores the terminal and stops until it is continued.
-    Suspends,
 }
 
-use Seen::{Changes, Hides, Sends, Shows, Suspends};
+use Seen::{Changes, Hides, Sends, Shows};
 
 /// An action, its key, the expected effect and the continuation.
 struct Row {
@@ -46,7 +43,8 @@ const LIVE: &[Row] = &[
     row(Action::ClearOverrides, "O", Hides("was 106.2"), ("", "")),
     row(Action::ArmingChecks, "P", Shows("Arming checks: 3 passed"), ("\x1b", "Press A to arm")),
     row(Action::Skip, "n", Shows("Skip the proposal?"), ("y", "skipped; a new proposal follows")),
-    row(Action::Suspend, "Ctrl-Z", Suspends, ("", "Press A to arm")),
+    // The program is the first of its session.
+    row(Action::Suspend, "Ctrl-Z", Shows("no shell to continue it"), ("", "Press A to arm")),
     row(Action::Arm, "A", Shows("STAND UP"), ("", "READY")),
     row(Action::SitDown, "D", Shows("SIT DOWN"), ("", "DISARMED")),
     row(Action::Stop, "F12", Shows("DAMPED"), ("", "k acknowledges")),
@@ -182,11 +180,6 @@ fn play(session: &mut Session, rows: &[Row]) {
             Changes => session.wait_until(&format!("{name} changes the screen"), || session.screen() != before),
             Sends(wanted) => {
                 session.wait_until(&format!("{name} sends its bytes"), || session.sent_after(bytes, wanted));
-            }
-            Suspends => {
-                session.wait_until("the terminal is restored", || session.restored() && session.cooked());
-                session.signal(Signal::SIGCONT);
-                session.wait_until("the terminal is taken again", || !session.restored());
             }
         }
         if row.action == Action::Approve {

@@ -229,29 +229,45 @@ fn signals_end_the_program_with_the_terminal_restored() {
 
 #[test]
 fn suspending_gives_the_terminal_back_and_continuing_takes_it() {
-    let (_folder, mut session) = Session::opened(SIZE, &[]);
-    session.send("\x1a");
-    session.wait_until("the terminal is given back", || session.restored() && session.cooked());
-    session.signal(Signal::SIGCONT);
-    session.wait_for(&["Press A to arm", "STOP  Space F12"]);
-    assert!(!session.restored());
+    let folder = folder();
+    let (mut session, console) = job_of_a_shell(folder.path(), &[]);
     // Refused while armed: a stopped process cannot stop a robot.
-    session.send("A");
-    session.wait_for(&["Press g twice"]);
-    session.signal(Signal::SIGTSTP);
+    kill(console, Signal::SIGTSTP).unwrap();
     session.wait_for(&["Ctrl-Z is not possible: the robot is armed"]);
-    session.send("qy");
-    assert!(session.wait().success());
-    assert!(session.restored() && session.cooked());
+    session.send("D");
+    session.wait_for(&["Press A to arm"]);
+    let from = session.bytes();
+    session.send("\x1a");
+    session.wait_for(&["Stopped"]);
+    assert!(session.sent_after(from, b"\x1b[?1049l"), "{}", session.screen());
+    session.send("fg\r");
+    session.wait_for(&["Press A to arm", "STOP  Space F12"]);
+    session.send("q");
+    session.wait_for(&["The study and its recording are in", "shell>"]);
+    end_shell(&mut session);
+}
+
+/// Regression: Ctrl-Z stopped a console without a shell above it for good, as in a terminal that runs nothing else. In a script
+/// without job control the shell is a part of the process group that stops.
+#[test]
+fn a_console_that_no_shell_can_continue_is_not_suspended() {
+    let console = format!("{} --output .", env!("CARGO_BIN_EXE_quadfrog"));
+    for script in [format!("exec {console}"), format!("{console}; exit $?")] {
+        let folder = folder();
+        let mut shell = CommandBuilder::new("bash");
+        shell.args(["--norc", "--noprofile", "-c", &script]);
+        let mut session = Session::run(folder.path(), SIZE, shell);
+        session.wait_for(&["Press A to arm"]);
+        session.send("\x1a");
+        session.wait_for(&["Ctrl-Z is not possible: there is no shell to continue it; quit instead"]);
+        session.send("q");
+        assert!(session.wait().success());
+    }
 }
 
 /// The console as a job of a shell, armed, and its process.
 fn job_of_a_shell(folder: &Path, variables: &[(&str, &str)]) -> (Session, Pid) {
-    let mut shell = CommandBuilder::new("bash");
-    shell.args(["--norc", "--noprofile", "-i"]);
-    shell.env("PS1", "shell> ");
-    let mut session = Session::run_in(folder, &Setup { size: SIZE, cell: (0, 0), variables }, shell);
-    session.wait_for(&["shell>"]);
+    let mut session = Session::shell(folder, &Setup { size: SIZE, cell: (0, 0), variables });
     session.send(&format!("{} --output .\r", env!("CARGO_BIN_EXE_quadfrog")));
     session.wait_for(&["Press A to arm"]);
     session.send("A");

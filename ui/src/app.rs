@@ -24,7 +24,7 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::{Feed, read_best_jump};
-use crate::foreground::in_foreground;
+use crate::foreground::{has_shell, in_foreground};
 use crate::graphics::GraphicsSupport;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
@@ -400,6 +400,11 @@ impl Console {
 
     /// Restores the terminal and stops this process, as Ctrl-Z does, until it is continued.
     fn suspend(&mut self) {
+        if !has_shell() {
+            let key = self.model.keymap.key(Action::Suspend);
+            let text = format!("{key} is not possible: there is no shell to continue it; quit instead");
+            return reply(&mut self.model, LogLevel::Warning, text);
+        }
         self.screen.release();
         // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);

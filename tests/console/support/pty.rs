@@ -130,6 +130,16 @@ impl Session {
         Session { master, writer, child, output, reader, reading, closed, cell: setup.cell }
     }
 
+    /// Starts a shell with job control and waits for its prompt, `shell>`.
+    pub fn shell(folder: &Path, setup: &Setup) -> Session {
+        let mut shell = CommandBuilder::new("bash");
+        shell.args(["--norc", "--noprofile", "-i"]);
+        shell.env("PS1", "shell> ");
+        let session = Session::run_in(folder, setup, shell);
+        session.wait_for(&["shell>"]);
+        session
+    }
+
     fn output(&self) -> MutexGuard<'_, Output> {
         self.output.lock().expect("output")
     }
