@@ -265,6 +265,24 @@ fn a_console_that_no_shell_can_continue_is_not_suspended() {
     }
 }
 
+/// Regression: the frame before the last one was often not written yet, and the last one, which says why the screen stands still,
+/// was left out.
+#[test]
+fn the_last_frame_says_that_the_robot_lands() {
+    let (_folder, mut session) = Session::opened(SIZE, &["--seed", "3"]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    session.approve();
+    session.wait_for(&["JUMP"]);
+    session.send("q");
+    session.wait_for(&["Quit?"]);
+    // The frame after the key draws every cell.
+    session.resize(200, 60);
+    session.send("y");
+    session.wait_for(&["quitting: the robot lands, then the program ends"]);
+    assert!(session.wait().success());
+}
+
 /// The console as a job of a shell, armed, and its process.
 fn job_of_a_shell(folder: &Path, variables: &[(&str, &str)]) -> (Session, Pid) {
     let mut session = Session::shell(folder, &Setup { size: SIZE, cell: (0, 0), variables });

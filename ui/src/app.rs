@@ -459,6 +459,7 @@ impl Console {
             say(&mut self.model, LogLevel::Info, format!("quitting: the robot {first}, then the program ends"));
         }
         self.redraw = true;
+        self.screen.wait_until_written();
         self.draw_if_due()?;
         self.space_bar_is_text.report(self.keys, false);
         let (feed, connection) = (self.feed, self.connection);

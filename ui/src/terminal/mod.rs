@@ -256,9 +256,10 @@ impl TerminalScreen {
         self.state.broken.store(true, Ordering::Release);
     }
 
-    fn wait_until_written(&self) {
+    /// Waits until the last frame was written, at most [`LEAVE_TIMEOUT`].
+    pub fn wait_until_written(&self) {
         let begun = std::time::Instant::now();
-        while !self.ready() && begun.elapsed() < LEAVE_TIMEOUT {
+        while !self.ready() && !self.hung_up && begun.elapsed() < LEAVE_TIMEOUT {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
