@@ -282,3 +282,15 @@ fn a_terminal_too_small_for_the_question_takes_no_control() {
     console.update(Msg::Resize(60, 20));
     assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
 }
+
+/// Regression: the last line was cut before "A arms" at 80 columns.
+#[test]
+fn the_arming_checks_name_the_key_that_arms() {
+    let mut console = on_hardware(Console::proposed());
+    console.press(&["P"]);
+    for (columns, rows) in [(60, 20), (80, 24), (120, 40)] {
+        let screen = console.screen(columns, rows);
+        let last: Vec<&str> = screen.lines().skip(usize::from(rows) - 2).collect();
+        assert_shows(&last.join(" "), &["A arms.", "q close."]);
+    }
+}

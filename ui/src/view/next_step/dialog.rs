@@ -38,10 +38,11 @@ pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
             format!("Type {left} to stand the robot up. Any other key cancels.")
         }
         Dialog::ArmingChecks { .. } => {
-            let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!(" {} arms.", key(Action::Arm)));
+            // First, since keys that scroll give way in a narrow terminal.
+            let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!("{} arms. ", key(Action::Arm)));
             match model.session.info.is_hardware() {
-                true => format!("Up Down choose, x confirms, PgUp PgDn Home End scroll, {close}{arms}"),
-                false => format!("Up Down PgUp PgDn Home End scroll, {close}{arms}"),
+                true => format!("{arms}Up Down choose, x confirms, PgUp PgDn Home End scroll, {close}"),
+                false => format!("{arms}Up Down PgUp PgDn Home End scroll, {close}"),
             }
         }
         Dialog::Override(form) if dialog.has_refused_character() => {
