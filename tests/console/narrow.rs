@@ -420,3 +420,23 @@ fn a_proposal_at_80_columns_is_whole_or_says_what_has_no_room() {
     assert_shows(&screen, &["p0", "p5", " 4 more have no room"]);
     assert!(!screen.contains("hop envelope"), "{screen}");
 }
+
+/// Regression: from trial 1000 on the numbers took the room of the columns behind them, which shifted.
+#[test]
+fn columns_stay_where_they_are_behind_large_numbers_of_trials() {
+    let mut console = Console::ready();
+    for number in [999, 1000, 10000] {
+        console.record(Record::Trial(TrialRecord { value: Some(0.5), ..trial(number, Some(Verdict::Accept), None) }));
+    }
+    for view in ["1", "2"] {
+        console.press(&[view]);
+        for (columns, rows) in [(80, 24), (120, 40)] {
+            let screen = console.screen(columns, rows);
+            let values: Vec<Option<usize>> = ["  999 ", " 1000 ", "10000 "]
+                .iter()
+                .map(|number| line_with(&screen, &format!("{number} ")).find("75.00"))
+                .collect();
+            assert!(values[0].is_some() && values.iter().all(|value| *value == values[0]), "{values:?}\n{screen}");
+        }
+    }
+}

@@ -74,11 +74,12 @@ pub fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn
     let origins = judged().count() == 0 || judged().any(|row| row.judged_by.is_some());
     let of_fixed_width: usize = shown.iter().filter(|c| c.width < usize::MAX).map(|c| c.width + 1).sum();
     let cause = shown.iter().any(|column| column.width == usize::MAX);
-    let needed = NUMBER_WIDTH + of_fixed_width + if cause { LEAST_CAUSE } else { 0 };
+    let number_width = number_digits(model) + 2;
+    let needed = number_width + of_fixed_width + if cause { LEAST_CAUSE } else { 0 };
     if !origins || needed > width {
         shown.retain(|column| !matches!(column.cell, CellContent::Of(Column::JudgedBy)));
     }
-    let mut left = width.saturating_sub(NUMBER_WIDTH);
+    let mut left = width.saturating_sub(number_width);
     for column in &mut shown {
         column.width = column.width.min(left);
         left = left.saturating_sub(column.width + 1);
@@ -87,8 +88,12 @@ pub fn shown_columns(model: &Model, width: usize, full: bool) -> Vec<ShownColumn
     shown
 }
 
-/// Width of the trial's number and the space behind it.
-const NUMBER_WIDTH: usize = 5;
+/// Digits of the largest number of a trial, at least 3. The cursor stands before the number, a mark behind it.
+pub fn number_digits(model: &Model) -> usize {
+    let recorded = model.timeline.iter().flat_map(|timeline| timeline.rows.keys().next_back());
+    let largest = model.session.trials.records.keys().next_back().into_iter().chain(recorded).max();
+    largest.and_then(|trial| trial.checked_ilog10()).map_or(3, |power| (power as usize + 1).max(3))
+}
 
 /// Characters of note and cause beside the origin of the verdict at least.
 const LEAST_CAUSE: usize = 60;

@@ -13,7 +13,7 @@ use crate::column::Column;
 use crate::layout::first_row;
 use crate::model::Model;
 use crate::model::comparison::Comparison;
-use crate::model::table_columns::{CellContent, ShownColumn, shown_columns};
+use crate::model::table_columns::{CellContent, ShownColumn, number_digits, shown_columns};
 use crate::model::trials::{SortBy, value_is_by_hand};
 use crate::text::remark;
 use crate::theme::Role;
@@ -107,7 +107,8 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
     let width = usize::from(area.width);
     let columns = shown_columns(model, width, full);
     let titles: Vec<String> = columns.iter().map(|column| padded(&column.title, column.width)).collect();
-    let title = format!("{:>4} {}", "#", titles.join(" "));
+    let digits = number_digits(model);
+    let title = format!(" {:>digits$} {}", "#", titles.join(" "));
     // In the whole table the line above says it.
     let later = if !full && model.later_trials().next().is_some() { " + later" } else { "" };
     let mut title = truncate(&title, width);
@@ -147,7 +148,7 @@ pub fn render_table(frame: &mut Frame, area: Rect, model: &Model, full: bool) {
         let later = model.is_later(trial.trial);
         let mark = mark(model, trial.trial);
         let cursor = if selected && model.chooses_row() { ">" } else { " " };
-        let number = format!("{cursor}{:>3}{mark}", trial.trial);
+        let number = format!("{cursor}{:>digits$}{mark}", trial.trial);
         let mut spans = vec![span(theme, if later { Role::Quiet } else { Role::Text }, number)];
         for column in &columns {
             let (text, role) = cell(model, trial, column, best == Some(trial.trial));
