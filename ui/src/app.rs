@@ -24,7 +24,7 @@ use crate::action::Action;
 use crate::connection::{ConnectionMonitor, TerminalLocation};
 
 use crate::feed::{Feed, read_best_jump};
-use crate::foreground::{has_shell, in_foreground};
+use crate::foreground::{NO_SHELL, has_shell, in_foreground};
 use crate::graphics::GraphicsSupport;
 use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
 use crate::message::{Effect, ExportedRows, Msg};
@@ -371,7 +371,8 @@ impl Console {
                 let written = export::best(&self.model);
                 self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
             }
-            Effect::Suspend => self.suspend(),
+            Effect::Suspend if has_shell() => self.suspend(),
+            Effect::Suspend => reply(&mut self.model, LogLevel::Warning, NO_SHELL),
             Effect::Quit => self.exit_with(ConsoleExit::Quit),
         }
     }
@@ -400,11 +401,6 @@ impl Console {
 
     /// Restores the terminal and stops this process, as Ctrl-Z does, until it is continued.
     fn suspend(&mut self) {
-        if !has_shell() {
-            let key = self.model.keymap.key(Action::Suspend);
-            let text = format!("{key} is not possible: there is no shell to continue it; quit instead");
-            return reply(&mut self.model, LogLevel::Warning, text);
-        }
         self.screen.release();
         // If SIGSTOP fails, the screen returns at once.
         let _ = raise(Signal::SIGSTOP);

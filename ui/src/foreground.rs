@@ -8,6 +8,9 @@ use std::io;
 use nix::sys::termios::{Termios, tcgetattr};
 use nix::unistd::{Pid, getpgid, getpgrp, getppid, getsid, tcgetpgrp};
 
+/// Reason for which a console without a shell is not suspended.
+pub const NO_SHELL: &str = "not suspended: there is no shell to continue it; quit instead";
+
 /// Whether this process has the terminal; also where nothing says so, for example without a controlling terminal.
 pub fn in_foreground() -> bool {
     tcgetpgrp(io::stdin()).map_or(true, |group| group == getpgrp())

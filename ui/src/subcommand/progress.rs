@@ -14,11 +14,11 @@ const ESTIMATE_FROM: f64 = 0.05;
 /// Time between two lines where there is no terminal: a log shows that the program lives, and stays short.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// How much of the work of a command is done, and the time left at the rate so far. The bar is removed when it is dropped.
+/// Share of a command's work that is done, and the time left at the rate so far. The bar is removed when it is dropped.
 pub struct Progress {
     /// The work, with which each line begins.
     name: String,
-    /// What is counted, as `jumps`; none where the parts of the work have no name of their own: a share is shown then.
+    /// Name of what is counted, as `jumps`; none where the parts of the work have none: a share is shown then.
     parts: Option<&'static str>,
     done: AtomicU64,
     all: u64,
