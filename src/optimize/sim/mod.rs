@@ -77,7 +77,8 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let search = SearchBox::of(ask, prior);
     let models = models(ensemble, &history)?;
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
-    let begins_anew = !models.1.has_worlds() && history.jumps.len() < ask.config.startup_trials(ask.space);
+    // The first jump was chosen by the simulated robots alone and does not count.
+    let begins_anew = !models.1.has_worlds() && history.jumps.len() <= ask.config.startup_trials(ask.space);
     let candidates = if all_given || begins_anew { Vec::new() } else { search.candidates(prior, ensemble) };
     let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
     let (unit, worth_the_risk) = if all_given {
