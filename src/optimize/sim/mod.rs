@@ -25,9 +25,6 @@ use libm::sqrt;
 use model::{StandingModel, ValueModel};
 use search::{Acquisition, PointPrediction};
 
-/// Points of the start over the whole space of which one is expected to stand.
-const TRIED: usize = 32;
-
 /// Proposes the next point for the given parameters.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
     let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
@@ -79,12 +76,15 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
     // The first jump was chosen by the simulated robots alone and does not count.
     let begins_anew = !models.1.has_worlds() && history.jumps.len() <= ask.config.startup_trials(ask.space);
-    let candidates = if all_given || begins_anew { Vec::new() } else { search.candidates(prior, ensemble) };
+    if begins_anew && !all_given {
+        // Far from the few jumps all points seem alike: a search would jump one corner of the space after the other.
+        let values = model_free::sobol(ask, streams).values;
+        return Some(Candidate { expected: expect(ask, &values), ..Candidate::from(values) });
+    }
+    let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
     let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
     let (unit, worth_the_risk) = if all_given {
         (search.bounds.iter().map(|(low, _)| *low).collect(), true)
-    } else if begins_anew {
-        (scattered(ask, prior, &acquisition, streams)?, true)
     } else {
         let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
         let worth = best.is_worth_the_risk();
@@ -100,34 +100,6 @@ fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: 
     let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
     let expected = Some(expectation(ask.direction, ensemble, &unit, &prediction, worth_the_risk));
     Some(Candidate { expected, ..Candidate::from(values) })
-}
-
-/// The next point over the whole space, as in the start of `gp`, whose probability of standing is accepted; of [`TRIED`] without one the
-/// surest. The few jumps so far were chosen by simulated robots that resemble this one in nothing, and far from them all points seem
-/// alike: a search would jump one corner of the space after the other. In the prior's unit cube.
-fn scattered(
-    ask: &Ask<'_>,
-    prior: &PriorModel,
-    acquisition: &Acquisition<'_>,
-    streams: &mut Streams,
-) -> Option<Vec<f64>> {
-    let mut surest: Option<(f64, Vec<f64>)> = None;
-    for _ in 0..TRIED {
-        let values = model_free::sobol(ask, streams).values;
-        let value = |known: &Parameter| {
-            let at = ask.space.parameters().iter().position(|p| p.name == known.name)?;
-            Some(known.range.scale(values[at]))
-        };
-        let unit = prior.prior().parameters.iter().map(value).collect::<Option<Vec<f64>>>()?;
-        let p_stand = acquisition.predict(&unit, &prior.features(&unit)?).p_stand;
-        if acquisition.accepts(p_stand) {
-            return Some(unit);
-        }
-        if surest.as_ref().is_none_or(|(most, _)| p_stand > *most) {
-            surest = Some((p_stand, unit));
-        }
-    }
-    surest.map(|(_, unit)| unit)
 }
 
 /// The prediction in the objective's unit and sign.

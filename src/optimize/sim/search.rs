@@ -143,11 +143,6 @@ impl<'a> Acquisition<'a> {
         PointPrediction { mean, variance, p_stand: self.standing.probability(x, features) }
     }
 
-    /// Whether a jump that stands with this probability may be worth its risk.
-    pub fn accepts(&self, p_stand: f64) -> bool {
-        p_stand >= self.least
-    }
-
     /// Scaled value by which a jump that stood is compared for the best: what a repetition is expected to be worth, P times the mean
     /// counted from the value of a fall.
     pub fn worth(&self, prediction: &PointPrediction) -> f64 {
@@ -169,7 +164,7 @@ impl<'a> Acquisition<'a> {
             Some(incumbent) => exp(log(deviation) + log_improvement((mean - incumbent) / deviation)),
         };
         let utility = p_stand * gain - self.price * self.star * (1.0 - p_stand);
-        let (reason, merit) = if utility > 0.0 && self.accepts(p_stand) {
+        let (reason, merit) = if utility > 0.0 && p_stand >= self.least {
             (Reason::Gain, utility)
         } else if 1.0 - p_stand <= SURE * (1.0 - self.least) {
             (Reason::Sure, mean + deviation - self.incumbent.unwrap_or(self.origin))
