@@ -2,9 +2,10 @@
 //! the prior's ensemble.
 //!
 //! `cargo run --release --example sim_to_real [KEY=VALUE...]`, keys `tasks`, `samplers` (lists with commas), `robots`, `studies`,
-//! `trials`, `seed`, `long_pairs` (studies of 100 jumps on each robot; 0: none), `jobs`, `least_p_stand` and `fall_price` (left out: those of the task's configuration), `backend` (`sim` or
-//! `hardware`, where the robots are controlled and judged by the estimate), `prior_backend` (left out: the same), `torque_limit` (a
-//! share for all robots; left out: drawn). Twelve robots: nine drawn from the ranges of `config/prior.toml` and three outside of them.
+//! `trials`, `seed`, `long_pairs` (pairs of studies of 100 jumps on each robot; 0: none), `jobs`, `least_p_stand` and `fall_price` (left
+//! out: those of the task's configuration), `backend` (`sim` or `hardware`, where the robots are controlled and judged by the estimate),
+//! `prior_backend` (left out: the same), `torque_limit` (a share for all robots; left out: drawn). Twelve robots: nine drawn from the
+//! ranges of `config/prior.toml` and three outside of them.
 //!
 //! A robot's value after n jumps is that of the trial that the study then calls its best, repeated [`REPEATS`] times with other
 //! noise, falls as 0. Its optimum is chosen and valued by independent repeats ([`attainable`]): the largest of many noisy values would be

@@ -281,8 +281,9 @@ fn a_replay_does_not_play_while_its_process_is_stopped() {
     let screen = session.screen();
     let first = screen.lines().next().unwrap();
     let clock = first.split_whitespace().find_map(|word| word.strip_prefix("00:")?.parse::<f64>().ok()).unwrap();
-    // However slow the machine is, it plays no longer than it runs, but for half a second in which it may be late.
-    assert!(clock <= (begun.elapsed() - STOPPED).as_secs_f64() + 0.5, "{clock} s in: {first}");
+    // However slow the machine is, it plays no longer than it runs, but for half a second each in which it may be late: when it begins, and
+    // when it goes on.
+    assert!(clock <= (begun.elapsed() - STOPPED).as_secs_f64() + 1.0, "{clock} s in: {first}");
 }
 
 /// Regression: from the start of a recording `best` led nowhere, and later to the best before the playhead.

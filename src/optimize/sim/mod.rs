@@ -1,8 +1,9 @@
 //! The sampler `sim`: a Gaussian process about the results of simulated robots, for some five jumps of a robot.
 //!
 //! The value and the standing of the robot are learned about those of the ensemble ([`model`]); the next point maximizes the
-//! expected gain less the price of a fall ([`search`]). A simulator that the values contradict is left
-//! ([`safeguard`]); with few jumps the study then begins over the whole space, as with `gp`. Without a prior, or with one of other parameters ([`PriorModel::covers`]), the sampler proposes as `gp`.
+//! expected gain less the price of a fall ([`search`]). A simulator that the values contradict is left ([`safeguard`]); with few jumps the
+//! study then begins over the whole space, as with `gp`. Without a prior, or with one of other parameters ([`PriorModel::covers`]), the
+//! sampler proposes as `gp`.
 
 pub mod history;
 pub mod insight;

@@ -115,7 +115,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             runs.extend(arguments.seeds.0.iter().map(planned));
         }
     }
-    let (progress, falls) = (Progress::new("runs", runs.len() as u64, None), AtomicUsize::new(0));
+    let (progress, falls) = (Progress::new("evaluation", runs.len() as u64, Some("runs")), AtomicUsize::new(0));
     // A simulator of each variant for each thread, made when the thread needs it.
     let none = || Ok::<_, Failure>(simulators.iter().map(|_| None).collect::<Vec<_>>());
     let evaluate_run = |rollouts: &mut Vec<Option<Rollout<Simulator>>>, run: &PlannedRun| {
