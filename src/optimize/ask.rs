@@ -82,7 +82,7 @@ pub struct SamplerConfig {
     /// TPE: candidates drawn from l(x) for one proposal.
     pub candidates: usize,
     /// `sim`: probability of standing, 0..1, below which no gain is worth a jump; three times the risk of a fall where the simulated
-    /// robots are left (`src/optimize/README.md`, "Ask").
+    /// robots are left, after a start as with `gp`, which has no bound (`src/optimize/README.md`, "Ask", "Wrong simulator").
     pub least_p_stand: f64,
     /// `sim`: price of a fall, as a share of the predicted value of the best jump so far, counted from the lowest value of the simulated
     /// robots where that is negative. In `config/optimize.toml` each task has its own.
