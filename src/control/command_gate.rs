@@ -35,23 +35,19 @@ impl CommandGate {
         self.pass_within(1.0, wanted, state, settings)
     }
 
-    /// Limits a command without regard to the measured state: positions and gains are clamped, the motors limit the torque.
+    /// Limits a command without regard to the measured state: positions and gains are clamped, the motors limit the torque. Wanted
+    /// velocities and torques, which count together with measured numbers, become 0.
     pub fn pass_unmeasured(&mut self, wanted: &JointCommand, settings: &ControlSettings) -> GateOutput {
         self.reset();
         let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         for (joint, motor) in passed.command.motor.iter_mut().enumerate() {
-            let finite = [motor.position_rad, motor.kp_joint, motor.kd_joint];
-            if !finite.iter().all(|value| value.is_finite()) {
-                let command = JointCommand::damping(settings.gate.damping_kd);
-                let fault = Some(Fault::NotFinite { what: "a motor command" });
-                return GateOutput { command, limited: u16::MAX >> (16 - JOINTS), fault };
-            }
-            *motor = MotorCommand {
-                position_rad: motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]),
-                kp_joint: motor.kp_joint.clamp(0.0, settings.gate.kp_max),
-                kd_joint: motor.kd_joint.clamp(0.0, settings.gate.kd_max),
-                ..MotorCommand::default()
+            let held = MotorCommand { velocity_rad_s: 0.0, torque_n_m: 0.0, ..*motor };
+            let limited = match clamped(&held, joint, settings) {
+                Ok(limited) => limited,
+                Err(fault) => return refused(fault, settings),
             };
+            passed.limited |= u16::from(limited != *motor) << joint;
+            *motor = limited;
         }
         passed
     }
@@ -74,75 +70,105 @@ impl CommandGate {
         settings: &ControlSettings,
     ) -> GateOutput {
         let damping = JointCommand::damping(settings.gate.damping_kd);
+        let last = self.last_torque.take();
         if *wanted == damping {
-            self.reset();
             return GateOutput { command: damping, limited: 0, fault: None };
         }
         let mut passed = GateOutput { command: *wanted, limited: 0, fault: None };
         let mut torques = Joints::default();
-        let refused = |fault| GateOutput { command: damping, limited: u16::MAX >> (16 - JOINTS), fault: Some(fault) };
-        for joint in 0..JOINTS {
-            let motor = &mut passed.command.motor[joint];
-            let finite = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
-            if !finite.iter().all(|value| value.is_finite()) {
-                self.reset();
-                return refused(Fault::NotFinite { what: "a motor command" });
-            }
-            let before = *motor;
-            motor.position_rad = motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]);
-            motor.kp_joint = motor.kp_joint.clamp(0.0, settings.gate.kp_max);
-            motor.kd_joint = motor.kd_joint.clamp(0.0, settings.gate.kd_max);
-            // tau_motor = tau + kp (q_d - q) + kd (dq_d - dq)
-            let (q, dq) = (state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]);
-            let feedback = motor.kp_joint * (motor.position_rad - q) + motor.kd_joint * (motor.velocity_rad_s - dq);
-            if !feedback.is_finite() {
-                self.reset();
-                return refused(Fault::NotFinite { what: "a joint's angle or velocity" });
-            }
-            let most_n_m = torque_share * settings.max_torque[joint];
-            let wanted_n_m = motor.torque_n_m + feedback;
-            if settings.hardware && wanted_n_m.abs() > MOST_WANTED_N_M {
-                self.reset();
-                let (measured_nm, allowed_nm) = (wanted_n_m, MOST_WANTED_N_M);
-                return refused(Fault::WantedTorque { joint: joint as u8, measured_nm, allowed_nm });
-            }
-            let mut torque = wanted_n_m.clamp(-most_n_m, most_n_m);
-            if let Some(last) = self.last_torque {
-                let step = settings.gate.torque_step_nm;
-                torque = torque.clamp(last[joint] - step, last[joint] + step);
-            }
-            motor.torque_n_m = torque - feedback;
-            let damped = motor.kp_joint == 0.0 && motor.velocity_rad_s == 0.0;
-            let kd_joint = motor.kd_joint;
-            if motor.torque_n_m.abs() > settings.max_torque[joint] {
-                // tau_motor = tau - kd dq, |tau| at most the limit.
-                let most_kd = (settings.max_torque[joint] - torque * dq.signum()) / dq.abs();
-                let kd_joint = (most_kd / MOTOR_DAMPING_STEP).floor() * MOTOR_DAMPING_STEP;
-                *motor = if damped && kd_joint > 0.0 {
-                    MotorCommand { torque_n_m: torque + kd_joint * dq, kd_joint, ..MotorCommand::default() }
-                } else {
-                    MotorCommand { torque_n_m: torque, ..MotorCommand::default() }
-                };
-            }
-            torques[joint] = torque;
-            // Rounding of the subtraction does not count as limited, nor does damping that moved to the feed-forward torque.
-            let moved = if damped {
-                (torque - wanted_n_m).abs() > 1e-9 || kd_joint != before.kd_joint
-            } else {
-                (motor.torque_n_m - before.torque_n_m).abs() > 1e-9 || motor.kd_joint != before.kd_joint
+        for (joint, motor) in passed.command.motor.iter_mut().enumerate() {
+            let measured = (state.joint_position_rad[joint], state.joint_velocity_rad_s[joint]);
+            let last = last.map(|torques| torques[joint]);
+            let limited = match limit_torque(motor, joint, measured, (torque_share, last), settings) {
+                Ok(limited) => limited,
+                Err(fault) => return refused(fault, settings),
             };
-            if moved
-                || motor.kp_joint != before.kp_joint
-                || (motor.kp_joint > 0.0 && motor.position_rad != before.position_rad)
-            {
-                passed.limited |= 1 << joint;
-            } else if motor.kd_joint == before.kd_joint {
-                motor.torque_n_m = before.torque_n_m;
-            }
+            torques[joint] = limited.torque_n_m;
+            passed.limited |= u16::from(limited.changed) << joint;
+            *motor = limited.motor;
         }
         self.last_torque = Some(torques);
         passed
     }
+}
+
+/// Damping of all joints for a command that cannot be sent.
+fn refused(fault: Fault, settings: &ControlSettings) -> GateOutput {
+    let command = JointCommand::damping(settings.gate.damping_kd);
+    GateOutput { command, limited: u16::MAX >> (16 - JOINTS), fault: Some(fault) }
+}
+
+/// The command with position and gains within their limits. A fault if a number is not finite.
+fn clamped(motor: &MotorCommand, joint: usize, settings: &ControlSettings) -> Result<MotorCommand, Fault> {
+    let finite = [motor.position_rad, motor.velocity_rad_s, motor.kp_joint, motor.kd_joint, motor.torque_n_m];
+    all_finite(&finite, "a motor command")?;
+    Ok(MotorCommand {
+        position_rad: motor.position_rad.clamp(settings.min_position[joint], settings.max_position[joint]),
+        kp_joint: motor.kp_joint.clamp(0.0, settings.gate.kp_max),
+        kd_joint: motor.kd_joint.clamp(0.0, settings.gate.kd_max),
+        ..*motor
+    })
+}
+
+/// The command of a joint within its limits.
+struct LimitedMotor {
+    motor: MotorCommand,
+    /// Torque of the motor's law at the measured angle and velocity, N m.
+    torque_n_m: f64,
+    /// Whether the motor does something else than was wanted.
+    changed: bool,
+}
+
+/// Steps 2 to 5 of [`CommandGate::pass_within`] for one joint at its measured angle q, rad, and velocity dq, rad/s. The torque is within
+/// `torque_share` of the joint's limit, then within a rate limit's step of the `last` one, N m, which therefore wins where the share
+/// falls.
+fn limit_torque(
+    wanted: &MotorCommand,
+    joint: usize,
+    (q, dq): (f64, f64),
+    (torque_share, last): (f64, Option<f64>),
+    settings: &ControlSettings,
+) -> Result<LimitedMotor, Fault> {
+    let clamped = clamped(wanted, joint, settings)?;
+    // tau_motor = tau + kp (q_d - q) + kd (dq_d - dq)
+    let feedback = clamped.kp_joint * (clamped.position_rad - q) + clamped.kd_joint * (clamped.velocity_rad_s - dq);
+    all_finite(&[feedback], "a joint's angle or velocity")?;
+    let wanted_n_m = clamped.torque_n_m + feedback;
+    if settings.hardware && wanted_n_m.abs() > MOST_WANTED_N_M {
+        let (measured_nm, allowed_nm) = (wanted_n_m, MOST_WANTED_N_M);
+        return Err(Fault::WantedTorque { joint: joint as u8, measured_nm, allowed_nm });
+    }
+    let most_n_m = torque_share * settings.max_torque[joint];
+    let mut torque_n_m = wanted_n_m.clamp(-most_n_m, most_n_m);
+    if let Some(last) = last {
+        let step = settings.gate.torque_step_nm;
+        torque_n_m = torque_n_m.clamp(last - step, last + step);
+    }
+    let mut motor = MotorCommand { torque_n_m: torque_n_m - feedback, ..clamped };
+    let damped = clamped.kp_joint == 0.0 && clamped.velocity_rad_s == 0.0;
+    if motor.torque_n_m.abs() > settings.max_torque[joint] {
+        // tau_motor = tau - kd dq, |tau| at most the limit.
+        let most_kd = (settings.max_torque[joint] - torque_n_m * dq.signum()) / dq.abs();
+        let kd_joint = (most_kd / MOTOR_DAMPING_STEP).floor() * MOTOR_DAMPING_STEP;
+        motor = if damped && kd_joint > 0.0 {
+            MotorCommand { torque_n_m: torque_n_m + kd_joint * dq, kd_joint, ..MotorCommand::default() }
+        } else {
+            MotorCommand { torque_n_m, ..MotorCommand::default() }
+        };
+    }
+    // Rounding of the subtraction does not count as a change, nor does damping that moved to the feed-forward torque.
+    let moved = if damped {
+        (torque_n_m - wanted_n_m).abs() > 1e-9 || clamped.kd_joint != wanted.kd_joint
+    } else {
+        (motor.torque_n_m - wanted.torque_n_m).abs() > 1e-9 || motor.kd_joint != wanted.kd_joint
+    };
+    let changed = moved
+        || motor.kp_joint != wanted.kp_joint
+        || (motor.kp_joint > 0.0 && motor.position_rad != wanted.position_rad);
+    if !changed && motor.kd_joint == wanted.kd_joint {
+        motor.torque_n_m = wanted.torque_n_m;
+    }
+    Ok(LimitedMotor { motor, torque_n_m, changed })
 }
 
 /// Checks that every measured number is finite.
