@@ -118,12 +118,11 @@ pub(super) fn joint_torque(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &
 }
 
 pub(super) fn tilt(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {
-    let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
-    let measured_rad = roll.abs().max(pitch.abs());
+    let measured_rad = inputs.estimate.tilt_rad();
     // The tilt limit is larger while the robot sits down.
     let limits = &settings.failsafe;
     let allowed_rad = if inputs.mode == Mode::SitDown { limits.tilt_rad } else { limits.stance_tilt_rad };
-    (measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
+    (measured_rad.is_nan() || measured_rad > allowed_rad).then_some(Fault::Tilt { measured_rad, allowed_rad })
 }
 
 pub(super) fn delay(_: &PeriodWatch, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Fault> {

@@ -81,9 +81,8 @@ fn feet(inputs: &ReadinessInputs, settings: &ControlSettings) -> Option<TrialInh
 }
 
 fn level(inputs: &ReadinessInputs, settings: &ControlSettings) -> Option<TrialInhibit> {
-    let [roll, pitch, _] = inputs.estimate.roll_pitch_yaw.into();
-    let (measured_rad, allowed_rad) = (roll.abs().max(pitch.abs()), settings.ready.tilt_rad);
-    let within = roll.abs() <= allowed_rad && pitch.abs() <= allowed_rad;
+    let (measured_rad, allowed_rad) = (inputs.estimate.tilt_rad(), settings.ready.tilt_rad);
+    let within = measured_rad <= allowed_rad;
     (!within).then_some(TrialInhibit::NotLevel { measured_rad, allowed_rad })
 }
 

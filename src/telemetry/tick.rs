@@ -24,6 +24,15 @@ pub struct Estimate {
     pub foot_position_leg: PerLeg<Vector3<f64>>,
 }
 
+impl Estimate {
+    /// The larger of roll and pitch without sign, rad; not a number if one of them is not.
+    pub fn tilt_rad(&self) -> f64 {
+        let [roll, pitch, _] = self.roll_pitch_yaw.into();
+        // `f64::max` drops a NaN.
+        if roll.is_nan() || pitch.is_nan() { f64::NAN } else { roll.abs().max(pitch.abs()) }
+    }
+}
+
 /// Durations of the stages of a tick, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TickDurations {

@@ -18,7 +18,7 @@ const NAME_WIDTH: usize = 15;
 
 /// Returns the details of a trial in lines of `width` columns; none of an unknown trial.
 pub fn lines(model: &Model, trial: u32, width: usize) -> Option<Vec<Line<'static>>> {
-    let record = model.as_recorded(trial)?;
+    let record = model.final_row(trial)?;
     let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
     let overrides = model.timeline.as_ref().map_or(&model.session.overrides, |timeline| &timeline.overrides);
     let rows = details(&model.session, &model.theme, record, overrides).into_iter().chain(rejudged(again));

@@ -146,10 +146,9 @@ impl Cycle {
 
     /// Whether the robot lies in an attitude, or with its legs in a pose, from which it cannot stand up.
     fn needs_placing(&self) -> bool {
-        let [roll, pitch, _] = self.tick.estimate.roll_pitch_yaw.into();
         let folded = self.findings.get(ArmingCheck::LyingDown);
         let unfolded = folded.is_some_and(|finding| finding.measured > finding.allowed);
-        roll.abs().max(pitch.abs()) > self.settings.failsafe.stance_tilt_rad || unfolded
+        self.tick.estimate.tilt_rad() > self.settings.failsafe.stance_tilt_rad || unfolded
     }
 
     /// Places a simulated robot at the origin, feet at the trial's stance. Returns false for a robot that only a person can place.

@@ -328,8 +328,8 @@ impl Model {
 
     /// Whether a simulated robot is tilted so far that arming turns it upright first.
     pub fn simulated_robot_lies(&self) -> bool {
-        let tilt = self.snapshot.tick.estimate.roll_pitch_yaw.xy().amax();
-        self.session.info.backend == Some(Backend::Simulator) && tilt > LYING_TILT_RAD
+        let tilt_rad = self.snapshot.tick.estimate.tilt_rad();
+        self.session.info.backend == Some(Backend::Simulator) && tilt_rad > LYING_TILT_RAD
     }
 
     /// Whether the arming checks are those of an earlier time: they run while the robot is disarmed.
@@ -406,12 +406,6 @@ impl Model {
     pub fn later_trials(&self) -> impl Iterator<Item = &TrialRecord> + '_ {
         let rows = self.timeline.iter().flat_map(|timeline| timeline.rows.values());
         rows.filter(|row| !self.session.trials.records.contains_key(&row.trial))
-    }
-
-    /// The row of a trial for its details: in a replay the newest of the whole recording.
-    pub fn as_recorded(&self, trial: u32) -> Option<&TrialRecord> {
-        let recorded = self.timeline.as_ref().and_then(|timeline| timeline.rows.get(&trial));
-        recorded.or_else(|| self.session.trials.records.get(&trial))
     }
 
     /// Whether a trial lies after the playhead of a replay.

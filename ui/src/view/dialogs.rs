@@ -111,7 +111,7 @@ fn render_checks(frame: &mut Frame, area: Rect, model: &Model, selected: usize, 
 
 /// The details of a trial; the paging keys scroll.
 fn render_details(frame: &mut Frame, area: Rect, model: &Model, trial: u32, scroll: usize) {
-    let Some(record) = model.as_recorded(trial) else { return };
+    let Some(record) = model.final_row(trial) else { return };
     let width = area.width.min(MAX_WIDTH);
     let lines = details::lines(model, trial, usize::from(width.saturating_sub(4))).unwrap_or_default();
     let at_playhead = model.session.trials.records.get(&trial);
