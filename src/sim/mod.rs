@@ -26,6 +26,7 @@ mod six;
 mod spatial;
 mod state;
 mod step;
+mod streams;
 pub mod terrain;
 
 use nalgebra::Vector3;

@@ -3,10 +3,10 @@
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::config::SensorConfig;
+use super::streams;
 use crate::robot::RobotState;
 use crate::robot::rotation::from_scaled_axis;
 
@@ -33,7 +33,7 @@ impl Sensors {
     pub fn new(config: &SensorConfig) -> Sensors {
         Sensors {
             config: *config,
-            random: ChaCha8Rng::seed_from_u64(0),
+            random: streams::random(0, streams::SENSORS),
             gyro_bias: Vector3::zeros(),
             accel_bias: Vector3::zeros(),
             tilt: Vector3::zeros(),
@@ -44,9 +44,7 @@ impl Sensors {
 
     /// Starts a trial: draws the biases and discards past states.
     pub fn reset(&mut self, seed: u64) {
-        // Not the stream of the terrain, which has the same seed.
-        self.random = ChaCha8Rng::seed_from_u64(seed);
-        self.random.set_stream(1);
+        self.random = streams::random(seed, streams::SENSORS);
         self.measured = 0;
         let config = self.config;
         self.gyro_bias = self.normal(config.gyro_bias_rad_s);
@@ -54,8 +52,8 @@ impl Sensors {
         self.tilt = self.normal(config.orientation_noise_rad);
     }
 
-    /// Returns the reported state for the true state `exact`; called once per control period. `truth` stays exact and
-    /// is not delayed.
+    /// Returns the reported state for the true state `exact`; called once per control period, and for each state that is set while a
+    /// robot is placed. `truth` stays exact and is not delayed.
     pub fn measure(&mut self, exact: &RobotState) -> RobotState {
         if !self.config.enabled {
             return *exact;

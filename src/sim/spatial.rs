@@ -117,9 +117,9 @@ impl<T: Real> SymmetricMatrix<T> {
         )
     }
 
-    /// A^-1 v of a positive matrix, by cofactors.
+    /// The cofactors and the determinant.
     #[inline(always)]
-    fn inverse_times(&self, v: &Vector3<T>) -> Vector3<T> {
+    pub fn cofactors(&self) -> (SymmetricMatrix<T>, T) {
         let SymmetricMatrix { xx, xy, xz, yy, yz, zz } = *self;
         let cofactors = SymmetricMatrix {
             xx: yy * zz - yz * yz,
@@ -129,7 +129,14 @@ impl<T: Real> SymmetricMatrix<T> {
             yz: xy * xz - xx * yz,
             zz: xx * yy - xy * xy,
         };
-        cofactors.times(v) / (xx * cofactors.xx + xy * cofactors.xy + xz * cofactors.xz)
+        (cofactors, xx * cofactors.xx + xy * cofactors.xy + xz * cofactors.xz)
+    }
+
+    /// A^-1 v of a positive matrix, by cofactors.
+    #[inline(always)]
+    fn inverse_times(&self, v: &Vector3<T>) -> Vector3<T> {
+        let (cofactors, determinant) = self.cofactors();
+        cofactors.times(v) / determinant
     }
 }
 

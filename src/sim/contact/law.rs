@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::sim::config::ContactLaw;
-use crate::sim::spatial::Real;
+use crate::sim::spatial::{Real, SymmetricMatrix};
 
 /// One contact in the coordinates normal, tangent, tangent.
 #[derive(Debug, Clone, Copy)]
@@ -70,24 +70,14 @@ impl LocalProblem {
         let m = &self.delassus;
         // p(s), and dp/ds = -(A + s D)^-1 D p; none where A + s D is not positive definite: s is too large.
         let at = |s: f64| {
-            let (m11, m22, m33) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
-            let (i11, i12, i13) = (m22 * m33 - m.m23 * m.m23, m.m13 * m.m23 - m.m12 * m33, m.m12 * m.m23 - m.m13 * m22);
-            let determinant = m11 * i11 + m.m12 * i12 + m.m13 * i13;
-            if m11 <= 0.0 || determinant <= 0.0 {
+            let (xx, yy, zz) = (m.m11 + s * weight, m.m22 + s, m.m33 + s);
+            let (cofactors, determinant) = SymmetricMatrix { xx, xy: m.m12, xz: m.m13, yy, yz: m.m23, zz }.cofactors();
+            if xx <= 0.0 || determinant <= 0.0 {
                 return None;
             }
-            let (i22, i23, i33) = (m11 * m33 - m.m13 * m.m13, m.m12 * m.m13 - m11 * m.m23, m11 * m22 - m.m12 * m.m12);
             let scale = -1.0 / determinant;
-            let solve = |v: Vector3<f64>| {
-                let product = Vector3::new(
-                    i11 * v.x + i12 * v.y + i13 * v.z,
-                    i12 * v.x + i22 * v.y + i23 * v.z,
-                    i13 * v.x + i23 * v.y + i33 * v.z,
-                );
-                product * scale
-            };
-            let p = solve(*c);
-            Some((p, solve(Vector3::new(weight * p.x, p.y, p.z))))
+            let p = cofactors.times(c) * scale;
+            Some((p, cofactors.times(&Vector3::new(weight * p.x, p.y, p.z)) * scale))
         };
         // f(s) = |p_t| - mu p_n has a root in (0, high]: at 0 the impulse is outside the cone, at `high` inside.
         let a = Vector2::new(m.m12, m.m13);
@@ -147,15 +137,10 @@ pub(super) fn into_cone(impulse: &Vector3<f64>, friction: f64) -> Vector3<f64> {
 
 /// Returns the inverse of a symmetric positive matrix by cofactors; both by their elements 11, 12, 13, 22, 23, 33.
 #[inline(always)]
-pub(super) fn symmetric_inverse<T: Real>([m11, m12, m13, m22, m23, m33]: [T; 6]) -> [T; 6] {
-    let i11 = m22 * m33 - m23 * m23;
-    let i12 = m13 * m23 - m12 * m33;
-    let i13 = m12 * m23 - m13 * m22;
-    let i22 = m11 * m33 - m13 * m13;
-    let i23 = m12 * m13 - m11 * m23;
-    let i33 = m11 * m22 - m12 * m12;
-    let scale = m11.splat(1.0) / (m11 * i11 + m12 * i12 + m13 * i13);
-    [i11 * scale, i12 * scale, i13 * scale, i22 * scale, i23 * scale, i33 * scale]
+pub(super) fn symmetric_inverse<T: Real>([xx, xy, xz, yy, yz, zz]: [T; 6]) -> [T; 6] {
+    let (i, determinant) = SymmetricMatrix { xx, xy, xz, yy, yz, zz }.cofactors();
+    let scale = xx.splat(1.0) / determinant;
+    [i.xx, i.xy, i.xz, i.yy, i.yz, i.zz].map(|cofactor| cofactor * scale)
 }
 
 /// Returns the symmetric matrix with the elements 11, 12, 13, 22, 23, 33.

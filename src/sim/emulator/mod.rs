@@ -17,12 +17,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 
 pub use endpoint::EmulatorClient;
 pub use fault::{EmulatorFault, EmulatorFaultError, help};
 
-use super::{EmulatorConfig, SimConfig, SimError};
+use super::{EmulatorConfig, SimConfig, SimError, streams};
 use crate::robot::description::RobotDescription;
 use crate::robot::go1::Go1Network;
 use crate::robot::hardware::{self, HardwareError};
@@ -191,9 +190,7 @@ impl Emulator {
         config: &SimConfig,
         seed: u64,
     ) -> Result<Emulator, EmulatorError> {
-        // Not the streams of the simulator's sensors and terrain, which have the same seed.
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(2);
+        let random = streams::random(seed, streams::NETWORK);
         Ok(Emulator {
             robot: EmulatedRobot::new(description, config, seed)?,
             config: config.emulator,

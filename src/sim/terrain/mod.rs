@@ -6,9 +6,10 @@ mod loose_block;
 
 use nalgebra::{Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::Rng;
 
 use super::config::{BlocksConfig, TerrainConfig, TerrainKind};
+use super::streams;
 use grid::BlockGrid;
 
 pub use block::TerrainBlock;
@@ -16,10 +17,6 @@ pub use loose_block::LooseBlock;
 
 /// Length and half of the width of a step: each extends to the far end, below all later ones, m.
 const FAR_M: f64 = 100.0;
-/// Random stream of the ground's friction.
-const FRICTION_STREAM: u64 = 2;
-/// Random stream of the blocks' friction.
-const BLOCK_FRICTION_STREAM: u64 = 3;
 
 /// Most contacts of one sphere at a time: a floor and a wall.
 pub const MAX_TERRAIN_CONTACTS: usize = 2;
@@ -111,7 +108,7 @@ impl Terrain {
             TerrainKind::Blocks => self.lay_blocks(seed),
         }
         if let (TerrainKind::Blocks, Some([low, high])) = (self.config.kind, self.config.blocks.friction_range) {
-            let mut random = stream(seed, BLOCK_FRICTION_STREAM);
+            let mut random = streams::random(seed, streams::BLOCK_FRICTION);
             for block in &mut self.blocks {
                 block.friction = between(low, high, &mut random);
             }
@@ -138,7 +135,7 @@ impl Terrain {
     fn lay_blocks(&mut self, seed: u64) {
         let BlocksConfig { count, layers, thickness_m, edge_m, friction, .. } = self.config.blocks;
         let [x_from, x_to, y_from, y_to] = self.config.blocks.area();
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = streams::random(seed, streams::BLOCKS);
         let mut uniform = |low: f64, high: f64| between(low, high, &mut random);
         let mut tries = 0;
         while self.blocks.len() < count as usize && tries < 50 * count {
@@ -289,16 +286,9 @@ impl TerrainConfig {
     pub fn friction_of(&self, seed: u64) -> f64 {
         match self.friction_range {
             None => self.friction,
-            Some([low, high]) => between(low, high, &mut stream(seed, FRICTION_STREAM)),
+            Some([low, high]) => between(low, high, &mut streams::random(seed, streams::FRICTION)),
         }
     }
-}
-
-/// Returns the random numbers of `stream` of the seed. Stream 0 lays the blocks, stream 1 draws the sensors' errors.
-fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    random
 }
 
 /// Returns a uniform number in [low, high).
