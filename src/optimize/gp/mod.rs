@@ -38,7 +38,7 @@ const CLOUD_WIDTHS: [f64; 3] = [0.2, 0.05, 0.01];
 /// Number of best trials that are centres.
 const CENTRES: usize = 3;
 /// Distance from a void trial, in units of the cube, at which the acquisition is reduced to 0.39 of its value.
-pub const VOID_RADIUS: f64 = 0.1;
+const VOID_RADIUS: f64 = 0.1;
 /// Finished trials from which on a probability of standing below [`LEAST_P_STAND`] reduces the acquisition. Before, the classifier
 /// knows little, and the search would stay among the careful points.
 const CAREFUL_FROM: usize = 10;
@@ -148,11 +148,7 @@ impl Acquisition {
     }
 
     fn log_distance(&self, x: &[f64]) -> f64 {
-        let away = |v: &Vec<f64>| {
-            let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
-            log((-expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))).max(1e-300))
-        };
-        self.void.iter().map(away).sum()
+        self.void.iter().map(|v| log(share_beside(x, v).max(1e-300))).sum()
     }
 
     /// The prediction at `x` in the objective's own sign. Falls count with the padding of the regression; before the first fall the
@@ -185,6 +181,12 @@ impl Acquisition {
         let summits = ranked.into_iter().take(CLIMBS).map(|(_, x)| ascent::maximize(&climb, &x, bounds, 50));
         summits.reduce(|a, b| if b.1 > a.1 { b } else { a }).map_or_else(|| vec![0.5; bounds.len()], |(x, _)| x)
     }
+}
+
+/// 1 - exp(-|x - v|^2 / 2 r^2): what is left of a gain at x beside a void or running trial at v; r is [`VOID_RADIUS`].
+pub fn share_beside(x: &[f64], v: &[f64]) -> f64 {
+    let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
+    -expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))
 }
 
 /// ln h(z), h(z) = phi(z) + z Phi(z): the expected improvement of a standard normal over -z, accurate in the tail.

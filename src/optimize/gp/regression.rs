@@ -54,7 +54,7 @@ impl Hyperparameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogNormal {
     /// ln of the median.
-    pub median: f64,
+    pub log_median: f64,
     /// Standard deviation of the logarithm.
     pub width: f64,
     /// ln of the smallest and the largest value that is tried.
@@ -63,8 +63,8 @@ pub struct LogNormal {
 
 impl LogNormal {
     /// From ln of the median, the width, and the smallest and the largest value that is tried.
-    pub fn new(median: f64, width: f64, (smallest, largest): (f64, f64)) -> LogNormal {
-        LogNormal { median, width, bounds: (log(smallest), log(largest)) }
+    pub fn new(log_median: f64, width: f64, (smallest, largest): (f64, f64)) -> LogNormal {
+        LogNormal { log_median, width, bounds: (log(smallest), log(largest)) }
     }
 }
 
@@ -89,14 +89,14 @@ impl HyperPrior {
 
     /// The medians.
     pub fn median(&self, d: usize) -> Hyperparameters {
-        Hyperparameters::from_log(&self.coordinates(d).map(|c| c.median).collect::<Vec<_>>())
+        Hyperparameters::from_log(&self.coordinates(d).map(|c| c.log_median).collect::<Vec<_>>())
     }
 
     /// ln p(theta) up to a constant, plus `log_likelihood` of theta, at given hyperparameters.
     pub fn log_posterior(&self, hyper: &Hyperparameters, log_likelihood: impl Fn(&[f64]) -> f64) -> f64 {
         let theta = hyper.to_log();
         let squares = theta.iter().zip(self.coordinates(hyper.lengthscale.len())).map(|(theta, prior)| {
-            let z = (theta - prior.median) / prior.width;
+            let z = (theta - prior.log_median) / prior.width;
             z * z
         });
         log_likelihood(&theta) - 0.5 * squares.sum::<f64>()
@@ -113,7 +113,7 @@ impl HyperPrior {
         let posterior = |theta: &[f64]| {
             let (mut value, mut gradient) = log_likelihood(theta);
             for (j, prior) in self.coordinates(d).enumerate() {
-                let z = (theta[j] - prior.median) / prior.width;
+                let z = (theta[j] - prior.log_median) / prior.width;
                 value -= 0.5 * z * z;
                 gradient[j] -= z / prior.width;
             }

@@ -18,99 +18,145 @@ use super::gp;
 use super::model_free;
 use super::mt19937::Mt19937;
 use super::prior::PriorModel;
-use super::prior::terms::{CANDIDATES, Ensemble, Features};
+use super::prior::terms::{CANDIDATE_SEED, CANDIDATES, Ensemble, Features};
 use super::sobol::Sobol;
 use super::space::Parameter;
 use history::{History, Jump};
 use libm::sqrt;
 use model::{StandingModel, ValueModel};
-use search::{Acquisition, PointPrediction};
+use search::Acquisition;
+use std::borrow::Cow;
 
 /// Proposes the next point for the given parameters.
 pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
-    let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
-    let proposal = covering.and_then(|prior| about_prior(ask, prior, prior.ensemble()?, streams));
+    let proposal = Fitted::of(ask).and_then(|fitted| fitted.propose(streams));
     proposal.unwrap_or_else(|| gp::propose(ask, streams))
 }
 
 /// Returns what the model expects of a trial at `values`, in the order of the space.
 pub fn expect(ask: &Ask<'_>, values: &[f64]) -> Option<Expectation> {
-    let fixed: Vec<(String, f64)> =
-        ask.space.parameters().iter().zip(values).map(|(p, value)| (p.name.clone(), *value)).collect();
-    let given = Ask { fixed: &fixed, ..*ask };
-    // With all parameters given no random number is drawn.
-    propose(&given, &mut Streams::new(0)).expected.or_else(|| gp::expect(ask, values))
+    Fitted::of(ask).and_then(|fitted| fitted.expect(values)).or_else(|| gp::expect(ask, values))
 }
 
 /// Returns what the model says of the finished trials.
 pub fn predict(ask: &Ask<'_>) -> Vec<Prediction> {
-    let covering = ask.prior.filter(|prior| prior.covers(ask.space).is_ok());
-    let about = |prior: &PriorModel| {
+    Fitted::of(ask).and_then(Fitted::predict).unwrap_or_else(|| gp::predict(ask))
+}
+
+/// The trials, and the models of value and standing that are fitted to them.
+struct Fitted<'a> {
+    ask: &'a Ask<'a>,
+    prior: &'a PriorModel,
+    ensemble: &'a Ensemble,
+    history: History,
+    models: (ValueModel, StandingModel),
+}
+
+impl<'a> Fitted<'a> {
+    /// Fits the models. `None` without a prior that covers the space, or if a covariance cannot be factored.
+    fn of(ask: &'a Ask<'a>) -> Option<Fitted<'a>> {
+        let prior = ask.prior.filter(|prior| prior.covers(ask.space).is_ok())?;
         let ensemble = prior.ensemble()?;
         let history = History::gather(prior, ensemble, ask.trials, ask.direction);
-        let models = models(ensemble, &history)?;
-        let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &[], ask.config)?;
+        let checked = safeguard::check(ValueModel::fit(ensemble, &history)?, ensemble, &history)?;
+        let shares = checked.trusted.then(|| worlds::shares(&worlds::log_likelihoods(ensemble, &history)));
+        let models = (checked.value, StandingModel::fit(ensemble, &history, shares)?);
+        Some(Fitted { ask, prior, ensemble, history, models })
+    }
+
+    /// The proposal of the model. Given parameters stay as they are.
+    fn propose(self, streams: &mut Streams) -> Option<Candidate> {
+        let ask = self.ask;
+        let given: Option<Vec<f64>> = ask.space.parameters().iter().map(|p| ask.given(p)).collect();
+        // The first jump was chosen by the simulated robots alone and does not count. Far from the few jumps all points seem alike: a
+        // search would jump one corner of the space after the other.
+        let begins_anew =
+            !self.models.1.has_worlds() && self.history.jumps.len() <= ask.config.startup_trials(ask.space);
+        if let Some(values) = given.or_else(|| begins_anew.then(|| model_free::sobol(ask, streams).values)) {
+            return Some(Candidate { expected: self.expect(&values), ..Candidate::from(values) });
+        }
+        let bounds = self.bounds();
+        let candidates = self.candidates(&bounds);
+        let (prior, ensemble) = (self.prior, self.ensemble);
+        let acquisition = self.acquisition(&candidates)?;
+        let best = acquisition.best_point(&candidates, &bounds, streams)?;
+        let value = |p: &Parameter| {
+            let at = prior.prior().parameters.iter().position(|known| known.name == p.name)?;
+            let proposed = prior.prior().parameters[at].range.extrapolate(best.point[at]);
+            Some(ask.given(p).unwrap_or(proposed.clamp(p.range.low, p.range.high)))
+        };
+        let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
+        let expected =
+            expectation(&acquisition, ask.direction, &best.point, &ensemble.features(prior.prior(), &best.point));
+        let expected = Expectation { worth_the_risk: best.is_worth_the_risk(), ..expected };
+        Some(Candidate { expected: Some(expected), ..Candidate::from(values) })
+    }
+
+    /// What the model expects at `values`, in the order of the space.
+    fn expect(self, values: &[f64]) -> Option<Expectation> {
+        let (ask, prior, ensemble) = (self.ask, self.prior, self.ensemble);
+        let value = |known: &Parameter| {
+            let at = ask.space.parameters().iter().position(|p| p.name == known.name);
+            known.range.scale(at.map_or(known.range.low, |at| values[at]))
+        };
+        let unit: Vec<f64> = prior.prior().parameters.iter().map(value).collect();
+        let acquisition = self.acquisition(&[])?;
+        Some(expectation(&acquisition, ask.direction, &unit, &ensemble.features(prior.prior(), &unit)))
+    }
+
+    /// What the model says of the finished trials.
+    fn predict(self) -> Option<Vec<Prediction>> {
+        let (direction, jumps) = (self.ask.direction, self.history.jumps.clone());
+        let acquisition = self.acquisition(&[])?;
         let prediction = |jump: &Jump| {
-            let prediction = acquisition.predict(&jump.point, &jump.features);
             let Expectation { value, deviation, .. } =
-                expectation(ask.direction, ensemble, &jump.point, &prediction, true);
-            let worth = in_own_unit(ask.direction, ensemble, acquisition.worth(&prediction));
+                expectation(&acquisition, direction, &jump.point, &jump.features);
+            let worth = acquisition.worth(&acquisition.predict(&jump.point, &jump.features));
+            let worth = in_own_unit(direction, acquisition.ensemble, worth);
             Prediction { trial: jump.number, stood: jump.stood, value, deviation, worth }
         };
-        Some(history.jumps.iter().map(prediction).collect())
-    };
-    covering.and_then(about).unwrap_or_else(|| gp::predict(ask))
-}
-
-/// The models of value and standing. `None` if a covariance cannot be factored.
-fn models(ensemble: &Ensemble, history: &History) -> Option<(ValueModel, StandingModel)> {
-    let checked = safeguard::check(ValueModel::fit(ensemble, history)?, ensemble, history)?;
-    let shares = checked.trusted.then(|| worlds::shares(&worlds::log_likelihoods(ensemble, history)));
-    Some((checked.value, StandingModel::fit(ensemble, history, shares)?))
-}
-
-/// The proposal of the model; `None` if a covariance cannot be factored.
-fn about_prior(ask: &Ask<'_>, prior: &PriorModel, ensemble: &Ensemble, streams: &mut Streams) -> Option<Candidate> {
-    let history = History::gather(prior, ensemble, ask.trials, ask.direction);
-    let search = SearchBox::of(ask, prior);
-    let models = models(ensemble, &history)?;
-    let all_given = ask.space.parameters().iter().all(|p| ask.given(p).is_some());
-    // The first jump was chosen by the simulated robots alone and does not count.
-    let begins_anew = !models.1.has_worlds() && history.jumps.len() <= ask.config.startup_trials(ask.space);
-    if begins_anew && !all_given {
-        // Far from the few jumps all points seem alike: a search would jump one corner of the space after the other.
-        let values = model_free::sobol(ask, streams).values;
-        return Some(Candidate { expected: expect(ask, &values), ..Candidate::from(values) });
+        Some(jumps.iter().map(prediction).collect())
     }
-    let candidates = if all_given { Vec::new() } else { search.candidates(prior, ensemble) };
-    let acquisition = Acquisition::new((prior.prior(), ensemble), models, &history, &candidates, ask.config)?;
-    let (unit, worth_the_risk) = if all_given {
-        (search.bounds.iter().map(|(low, _)| *low).collect(), true)
-    } else {
-        let best = acquisition.best_point(&candidates, &search.bounds, streams)?;
-        let worth = best.is_worth_the_risk();
-        (best.point, worth)
-    };
-    let features = ensemble.features(prior.prior(), &unit);
-    let prediction = acquisition.predict(&unit, &features);
-    let value = |p: &Parameter| {
-        let at = prior.prior().parameters.iter().position(|known| known.name == p.name)?;
-        let proposed = prior.prior().parameters[at].range.extrapolate(unit[at]);
-        Some(ask.given(p).unwrap_or(proposed.clamp(p.range.low, p.range.high)))
-    };
-    let values = ask.space.parameters().iter().map(value).collect::<Option<Vec<f64>>>()?;
-    let expected = Some(expectation(ask.direction, ensemble, &unit, &prediction, worth_the_risk));
-    Some(Candidate { expected, ..Candidate::from(values) })
+
+    fn acquisition(self, candidates: &[(Vec<f64>, Features)]) -> Option<Acquisition<'a>> {
+        let simulated = (self.prior.prior(), self.ensemble);
+        Acquisition::new(simulated, self.models, &self.history, candidates, self.ask.config)
+    }
+
+    /// Lower and upper bound of each coordinate of the prior's unit cube; equal for a given parameter, and beyond 0..1 where the study's
+    /// bounds are wider.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let bound = |known: &Parameter| {
+            let searched = self.ask.space.parameters().iter().find(|p| p.name == known.name);
+            let range = searched.map_or(known.range, |p| p.range);
+            match searched.and_then(|p| self.ask.given(p)) {
+                Some(value) => (known.range.scale(value), known.range.scale(value)),
+                None => (known.range.scale(range.low), known.range.scale(range.high)),
+            }
+        };
+        self.prior.prior().parameters.iter().map(bound).collect()
+    }
+
+    /// Points within the bounds with their terms: those of the prior where the bounds are the cube, else as many of the same sequence.
+    fn candidates(&self, bounds: &[(f64, f64)]) -> Cow<'a, [(Vec<f64>, Features)]> {
+        if bounds.iter().all(|bounds| *bounds == (0.0, 1.0)) {
+            return Cow::Borrowed(&self.ensemble.candidates);
+        }
+        let sobol = Sobol::new(bounds.len(), &mut Mt19937::new(CANDIDATE_SEED));
+        let candidate = |i| {
+            let place = |(u, (low, high)): (f64, &(f64, f64))| low + (high - low) * u;
+            let x: Vec<f64> = sobol.point(i).into_iter().zip(bounds).map(place).collect();
+            let features = self.ensemble.features(self.prior.prior(), &x);
+            (x, features)
+        };
+        Cow::Owned((0..CANDIDATES).map(candidate).collect())
+    }
 }
 
-/// The prediction in the objective's unit and sign.
-fn expectation(
-    direction: Direction,
-    ensemble: &Ensemble,
-    unit: &[f64],
-    prediction: &PointPrediction,
-    worth_the_risk: bool,
-) -> Expectation {
+/// The prediction at a point of the unit cube with its terms, in the objective's unit and sign.
+fn expectation(acquisition: &Acquisition<'_>, direction: Direction, unit: &[f64], features: &Features) -> Expectation {
+    let ensemble = acquisition.ensemble;
+    let prediction = acquisition.predict(unit, features);
     let worlds = ensemble.world_values(unit).into_iter().map(|value| direction.maximized(value));
     let worlds = worlds.fold(None, |range: Option<(f64, f64)>, value| {
         Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
@@ -120,49 +166,11 @@ fn expectation(
         deviation: ensemble.scale * sqrt(prediction.variance),
         p_stand: prediction.p_stand,
         worlds,
-        worth_the_risk,
+        worth_the_risk: true,
     }
 }
 
 /// A scaled value in the objective's unit and sign.
 fn in_own_unit(direction: Direction, ensemble: &Ensemble, scaled: f64) -> f64 {
     direction.maximized(ensemble.offset + ensemble.scale * scaled)
-}
-
-/// The part of the prior's unit cube that is searched.
-struct SearchBox {
-    /// Lower and upper bound of each coordinate; equal for a given parameter, and beyond 0..1 where the study's bounds are wider.
-    bounds: Vec<(f64, f64)>,
-}
-
-impl SearchBox {
-    fn of(ask: &Ask<'_>, prior: &PriorModel) -> SearchBox {
-        let bound = |known: &Parameter| {
-            let searched = ask.space.parameters().iter().find(|p| p.name == known.name);
-            let range = searched.map_or(known.range, |p| p.range);
-            match searched.and_then(|p| ask.given(p)) {
-                Some(value) => (known.range.scale(value), known.range.scale(value)),
-                None => (known.range.scale(range.low), known.range.scale(range.high)),
-            }
-        };
-        SearchBox { bounds: prior.prior().parameters.iter().map(bound).collect() }
-    }
-
-    /// Points over the box with their terms: those of the prior where the box is the cube, else as many of the same sequence.
-    fn candidates(&self, prior: &PriorModel, ensemble: &Ensemble) -> Vec<(Vec<f64>, Features)> {
-        if self.bounds.iter().all(|bounds| *bounds == (0.0, 1.0)) {
-            return ensemble.candidates.clone();
-        }
-        let sobol = Sobol::new(self.bounds.len(), &mut Mt19937::new(super::prior::terms::CANDIDATE_SEED));
-        let point = |i| -> Vec<f64> {
-            sobol.point(i).iter().zip(&self.bounds).map(|(u, (low, high))| low + (high - low) * u).collect()
-        };
-        let points = (0..CANDIDATES).map(point);
-        points
-            .map(|x| {
-                let features = ensemble.features(prior.prior(), &x);
-                (x, features)
-            })
-            .collect()
-    }
 }

@@ -18,13 +18,13 @@ use nalgebra::{DMatrix, DVector};
 /// Standard deviation of the bias b.
 const BIAS: f64 = 0.5;
 /// Standard deviation of the scale rho about 1.
-const SCALE: f64 = 0.3;
+const RHO: f64 = 0.3;
 /// Sum of the variances of the weights of the components.
-const COMPONENTS: f64 = 2.0;
+const WEIGHTS: f64 = 2.0;
 /// Factor of these variances for the label's components: an odds ratio a unit of the label.
-const LABEL_COMPONENTS: f64 = 4.0;
+const LABEL_WEIGHTS: f64 = 4.0;
 /// ln of the median variance of delta.
-const DELTA: f64 = -2.0;
+const LOG_DELTA: f64 = -2.0;
 /// Mean of b0 without the simulated robots: a jump within the bounds stands rather than falls.
 const STANDS: f64 = 1.0;
 /// Lengthscale and variance of delta_c.
@@ -42,19 +42,19 @@ pub struct ValueModel {
     linear: LinearPrior,
     hyper: Hyperparameters,
     /// ln p(y | theta) p(theta) at the fitted hyperparameters.
-    pub log_evidence: f64,
+    pub log_posterior: f64,
 }
 
 impl ValueModel {
     /// Fits the jumps that stood. `None` if a covariance cannot be factored.
     pub fn fit(ensemble: &Ensemble, history: &History) -> Option<ValueModel> {
         let r = ensemble.components().0;
-        let mut linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, SCALE * SCALE] };
+        let mut linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, RHO * RHO] };
         linear.mean.extend(std::iter::repeat_n(0.0, r));
-        linear.variance.extend(std::iter::repeat_n(COMPONENTS / r.max(1) as f64, r));
+        linear.variance.extend(std::iter::repeat_n(WEIGHTS / r.max(1) as f64, r));
         let terms = history.stood().map(|jump| jump.features.value.clone()).collect();
         let observed = history.observations(ensemble, terms);
-        ValueModel::about(observed, linear, &hyper_prior(DELTA), history.dimensions)
+        ValueModel::about(observed, linear, &hyper_prior(LOG_DELTA), history.dimensions)
     }
 
     /// Fits a model without prior: a constant of variance 1 and a signal of the prior's scale.
@@ -69,7 +69,7 @@ impl ValueModel {
     pub fn log_likelihood_about(ensemble: &Ensemble, history: &History, simulated: &[f64]) -> f64 {
         let linear = LinearPrior { mean: vec![0.0, 1.0], variance: vec![BIAS * BIAS, 0.0] };
         let observed = history.observations(ensemble, simulated.iter().map(|value| vec![1.0, *value]).collect());
-        let theta = hyper_prior(DELTA).median(history.dimensions).to_log();
+        let theta = hyper_prior(LOG_DELTA).median(history.dimensions).to_log();
         let covariance = observed.linear_covariance(&linear);
         log_likelihood(&theta, &observed.points, &observed.residual(&linear), Some(&covariance)).0
     }
@@ -77,14 +77,14 @@ impl ValueModel {
     fn about(observed: Observations, linear: LinearPrior, prior: &HyperPrior, d: usize) -> Option<ValueModel> {
         let hyper = if observed.values.len() > 1 { fitted(&observed, &linear, prior, d)? } else { prior.median(d) };
         if observed.values.is_empty() {
-            return Some(ValueModel { regression: None, linear, hyper, log_evidence: 0.0 });
+            return Some(ValueModel { regression: None, linear, hyper, log_posterior: 0.0 });
         }
-        let log_evidence = prior.log_posterior(&hyper, |theta| {
+        let log_posterior = prior.log_posterior(&hyper, |theta| {
             let covariance = observed.linear_covariance(&linear);
             log_likelihood(theta, &observed.points, &observed.residual(&linear), Some(&covariance)).0
         });
         let regression = Regression::condition(observed, linear.clone(), hyper.clone())?;
-        Some(ValueModel { regression: Some(regression), linear, hyper, log_evidence })
+        Some(ValueModel { regression: Some(regression), linear, hyper, log_posterior })
     }
 
     /// Takes running trials as observed at their expected value.
@@ -164,7 +164,7 @@ impl StandingPrior {
             };
         }
         let r = ensemble.components().1;
-        let component = LABEL_COMPONENTS * COMPONENTS / r.max(1) as f64;
+        let component = LABEL_WEIGHTS * WEIGHTS / r.max(1) as f64;
         let mut all = StandingPrior {
             mean: DVector::zeros(3 + r),
             covariance: DMatrix::from_diagonal_element(3 + r, 3 + r, component),

@@ -29,7 +29,7 @@ pub struct CheckedValue {
 /// Chooses between `about`, the model about the simulated robots, and one without them. `None` if a covariance cannot be factored.
 pub fn check(about: ValueModel, ensemble: &Ensemble, history: &History) -> Option<CheckedValue> {
     let without = ValueModel::without_prior(ensemble, history)?;
-    let log_bayes_factor = about.log_evidence - without.log_evidence;
+    let log_bayes_factor = about.log_posterior - without.log_posterior;
     let trusted = log_bayes_factor >= -LEFT;
     Some(CheckedValue { value: if trusted { about } else { without }, trusted, log_bayes_factor })
 }

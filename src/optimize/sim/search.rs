@@ -3,11 +3,11 @@
 use super::history::History;
 use super::model::{StandingModel, ValueModel};
 use crate::optimize::ask::{SamplerConfig, Streams};
-use crate::optimize::gp::{VOID_RADIUS, log_improvement};
+use crate::optimize::gp::{log_improvement, share_beside};
 use crate::optimize::prior::Prior;
 use crate::optimize::prior::terms::{Ensemble, Features};
 use crate::optimize::sobol::Sobol;
-use libm::{exp, expm1, log, pow, sqrt};
+use libm::{exp, log, pow, sqrt};
 use std::cmp::Ordering;
 
 /// Factor of the price for each fall in a row.
@@ -177,13 +177,9 @@ impl<'a> Acquisition<'a> {
         Scored { point: x.to_vec(), score, prediction }
     }
 
-    /// Product over void and running points v of 1 - exp(-|x - v|^2 / 2 r^2)
+    /// What void and running trials together leave of a gain.
     fn away(&self, x: &[f64]) -> f64 {
-        let away = |v: &Vec<f64>| {
-            let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
-            -expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))
-        };
-        self.avoided.iter().map(away).product()
+        self.avoided.iter().map(|v| share_beside(x, v)).product()
     }
 
     /// Searches the box, given as bounds in the prior's unit cube, from the candidates over it, in local rounds. Takes one double per
