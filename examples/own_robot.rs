@@ -29,7 +29,7 @@ impl Robot for WeakKnee {
         self.simulator.read()
     }
 
-    /// Sends one command. The gains scale with the torque: tau = torque + kp (q - q) + kd (dq - dq).
+    /// Sends one command. The gains scale with the torque: tau = torque + kp (q_d - q) + kd (dq_d - dq).
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
         let mut weak = *command;
         let MotorCommand { torque_n_m, kp_joint, kd_joint, .. } = &mut weak.motor[KNEE];

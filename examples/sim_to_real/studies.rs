@@ -57,11 +57,17 @@ pub(super) enum Proposer {
 impl Proposer {
     pub(super) const ALL: [(&'static str, Proposer); 5] = [
         ("sim", Proposer::Sim),
-        ("sim, mirrored simulator", Proposer::SimMirrored),
+        ("sim-mirrored", Proposer::SimMirrored),
         ("gp", Proposer::Gp),
         ("tpe", Proposer::Tpe),
-        ("ideal best, then gp", Proposer::IdealFirst),
+        ("ideal-first", Proposer::IdealFirst),
     ];
+
+    pub(super) fn named(name: &str) -> Proposer {
+        let known = Proposer::ALL.iter().find(|(known, _)| *known == name);
+        let names = Proposer::ALL.map(|(name, _)| name).join(", ");
+        known.unwrap_or_else(|| panic!("`{name}` is no sampler; give {names}, with commas between them")).1
+    }
 
     pub(super) fn name(self) -> &'static str {
         Proposer::ALL.iter().find(|(_, proposer)| *proposer == self).map_or("", |(name, _)| name)
