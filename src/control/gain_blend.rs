@@ -1,6 +1,7 @@
 //! Smooth change of the controller's gains on a standing robot: another stiffness changes the sag at once otherwise (5 cm from 400
 //! to 800 N/m).
 
+use super::ramp::smoothstep;
 use crate::robot::ticks_in;
 use crate::trial::Gains;
 
@@ -33,9 +34,7 @@ impl GainBlend {
         *now = if self.elapsed >= ticks {
             *to
         } else {
-            let part = f64::from(self.elapsed) / f64::from(ticks);
-            // Smoothstep 3 s^2 - 2 s^3: starts and ends at rest.
-            let smooth = part * part * (3.0 - 2.0 * part);
+            let smooth = smoothstep(f64::from(self.elapsed) / f64::from(ticks));
             let between = |from: f64, to: f64| from + smooth * (to - from);
             Gains {
                 kp: between(from.kp, to.kp),

@@ -56,11 +56,15 @@ impl PoseRamp {
             let count = |ticks: u32, exceeds: bool| if exceeds { ticks + 1 } else { 0 };
             self.behind[joint] = count(self.behind[joint], error_rad.abs() > limits.ramp_error_rad);
             self.strained[joint] = count(self.strained[joint], torque_nm.abs() > allowed_nm);
-            let name = joint as u8;
+            let joint_number = joint as u8;
             let fault = if self.behind[joint] >= most_ticks {
-                Fault::FollowingError { joint: name, measured_rad: error_rad, allowed_rad: limits.ramp_error_rad }
+                Fault::FollowingError {
+                    joint: joint_number,
+                    measured_rad: error_rad,
+                    allowed_rad: limits.ramp_error_rad,
+                }
             } else if self.strained[joint] >= most_ticks {
-                Fault::RampTorque { joint: name, measured_nm: torque_nm, allowed_nm }
+                Fault::RampTorque { joint: joint_number, measured_nm: torque_nm, allowed_nm }
             } else {
                 continue;
             };
@@ -88,10 +92,14 @@ impl PoseRamp {
     pub fn command(&mut self) -> JointCommand {
         let duration = f64::from(ticks_in(self.settings.duration_s).max(1));
         let part = (f64::from(self.elapsed) / duration).min(1.0);
-        // Smoothstep 3 s^2 - 2 s^3: starts and ends at rest.
-        let smooth = part * part * (3.0 - 2.0 * part);
+        let smooth = smoothstep(part);
         self.elapsed += 1;
         self.target = std::array::from_fn(|joint| self.from[joint] + smooth * (self.to[joint] - self.from[joint]));
         JointCommand::hold(&self.target, self.settings.kp, self.settings.kd)
     }
+}
+
+/// 3 s^2 - 2 s^3 of a share s of the way, 0 to 1: starts and ends at rest.
+pub(super) fn smoothstep(share: f64) -> f64 {
+    share * share * (3.0 - 2.0 * share)
 }

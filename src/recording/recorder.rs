@@ -244,7 +244,8 @@ impl Recorder {
         let before = self.last.back().map(|last| last.mode);
         self.last.push_back(*tick);
         if tick.mode == Mode::Fault && before != Some(Mode::Fault) {
-            let _ = self.handed.send(CollectedTicks::Fault(self.last.iter().copied().collect())); // as with a trial's
+            // As with the ticks of a trial, nobody may wait for them.
+            let _ = self.handed.send(CollectedTicks::Fault(self.last.iter().copied().collect()));
         }
     }
 

@@ -241,7 +241,7 @@ pub struct Style {
     pub colour: (u8, u8, u8),
     /// Length of a dash and of the gap after it, pixels of a figure 720 wide; none for a solid line.
     pub dash: Option<(u32, u32)>,
-    /// PointMarker of points.
+    /// Marker of points.
     pub marker: PointMarker,
 }
 

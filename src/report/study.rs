@@ -203,7 +203,7 @@ pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     let deviation = match values.len() {
         0 => f64::NAN,
-        1 => squares,
+        1 => 0.0,
         _ => (squares / (count - 1.0)).sqrt(),
     };
     (mean, deviation)

@@ -175,8 +175,7 @@ pub fn best(StudyGroup { name, studies: group }: &StudyGroup) -> Table {
     let mut table = Table::new(format!("Best trial of each study, {name}.{chosen}{by_hand}"), columns);
     for study in group {
         let Some(row) = study.best_row() else { continue };
-        let own =
-            group[0].parameters.iter().map(|p| Cell::optional(row.parameters.get(&p.name), digits(p.low, p.high)));
+        let own = parameter_cells(group[0], row);
         let cells = [Cell::text(study.label()), Cell::count(row.trial as usize), value(row)];
         let best = study.model_best;
         let model = [best.map(|best| best.value), best.map(|best| best.deviation)];

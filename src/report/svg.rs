@@ -155,14 +155,19 @@ fn text_width(text: &str) -> u32 {
     (text.chars().count() as f64 * f64::from(TEXT) * CHARACTER).ceil() as u32
 }
 
+/// Sample of a series before its label.
+#[derive(Clone, Copy)]
+enum Sample {
+    Line,
+    Marker,
+    Bar,
+}
+
 /// One entry of the legend.
 struct Entry {
     label: String,
     style: Style,
-    /// Whether it has a line, and a marker.
-    line: bool,
-    marker: bool,
-    bar: bool,
+    sample: Sample,
     /// Distance of its beginning from the left, pixels.
     x: u32,
 }
@@ -173,22 +178,22 @@ const SAMPLE: u32 = 34;
 /// Returns the lines of the legend; one series without limits needs none.
 fn legend(figure: &Figure) -> Vec<Vec<Entry>> {
     let mut entries: Vec<Entry> = Vec::new();
-    let mut add = |label: &str, style: usize, [line, marker, bar]: [bool; 3]| {
+    let mut add = |label: &str, style: usize, sample: Sample| {
         if !label.is_empty() && !entries.iter().any(|entry| entry.label == printable(label)) {
-            entries.push(Entry { label: printable(label), style: Style::of(style), line, marker, bar, x: 0 });
+            entries.push(Entry { label: printable(label), style: Style::of(style), sample, x: 0 });
         }
     };
     for panel in &figure.panels {
         for series in &panel.series {
             let sample = match series.shape {
-                Shape::Line(_) | Shape::Step(_) | Shape::Band(_) => [true, false, false],
-                Shape::Points(_) | Shape::Arrows(_) => [false, true, false],
-                Shape::Marks(_) => [false, false, true],
+                Shape::Line(_) | Shape::Step(_) | Shape::Band(_) => Sample::Line,
+                Shape::Points(_) | Shape::Arrows(_) => Sample::Marker,
+                Shape::Marks(_) => Sample::Bar,
             };
             add(&series.label, series.style, sample);
         }
         for limit in &panel.limits {
-            add(&limit.label, LIMIT_STYLE, [true, false, false]);
+            add(&limit.label, LIMIT_STYLE, Sample::Line);
         }
     }
     let mut lines: Vec<Vec<Entry>> = Vec::new();
@@ -210,20 +215,19 @@ impl Entry {
     fn draw(&self, root: &Area, y: i32) -> Drawn {
         let (x, y) = (fine(self.x), y * FINE as i32);
         let ink = colour(self.style);
-        if self.line {
-            let path = [(x, y), (x + fine(SAMPLE - 8), y)];
-            match self.style.dash {
-                None => root.draw(&PathElement::new(path, ink.stroke_width(2 * FINE)))?,
-                Some((dash, gap)) => {
-                    root.draw(&DashedPathElement::new(path, dash * FINE, gap * FINE, ink.stroke_width(2 * FINE)))?
+        match self.sample {
+            Sample::Line => {
+                let path = [(x, y), (x + fine(SAMPLE - 8), y)];
+                let stroke = ink.stroke_width(2 * FINE);
+                match self.style.dash {
+                    None => root.draw(&PathElement::new(path, stroke))?,
+                    Some((dash, gap)) => root.draw(&DashedPathElement::new(path, dash * FINE, gap * FINE, stroke))?,
                 }
             }
-        }
-        if self.marker {
-            marker(root, self.style, (x + fine(SAMPLE / 2), y))?;
-        }
-        if self.bar {
-            root.draw(&Rectangle::new([(x + fine(6), y - fine(1)), (x + fine(26), y + fine(1))], ink.filled()))?;
+            Sample::Marker => marker(root, self.style, (x + fine(SAMPLE / 2), y))?,
+            Sample::Bar => {
+                root.draw(&Rectangle::new([(x + fine(6), y - fine(1)), (x + fine(26), y + fine(1))], ink.filled()))?
+            }
         }
         let at = font().pos(Pos::new(HPos::Left, VPos::Center));
         root.draw(&Text::new(self.label.clone(), (x + fine(SAMPLE - 4), y), at))

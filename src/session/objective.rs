@@ -93,7 +93,7 @@ fn bounced(measured: &MeasuredJump) -> bool {
 }
 
 /// Returns the displacement or turn in the direction of the task, m or rad.
-fn along(task: Task, displacement: &Displacement) -> f64 {
+pub fn along(task: Task, displacement: &Displacement) -> f64 {
     match task {
         Task::Forward => displacement.dx_m,
         Task::LateralLeft => displacement.dy_m,

@@ -1,8 +1,10 @@
 //! The jumps of the running trial, from its ticks as they arrive.
 
 use nalgebra::Vector3;
+use quadfrog::robot::rotation::about_z;
+use quadfrog::session::objective::along;
 use quadfrog::telemetry::{Phase, Tick};
-use quadfrog::trial::Task;
+use quadfrog::trial::{Displacement, Task};
 
 use super::session::SessionModel;
 
@@ -67,15 +69,8 @@ impl JumpSeries {
     /// Displacement or turn of one jump in the direction of the task, m or rad.
     fn value(&self, task: Task, jump: &LiveJump) -> f64 {
         let yaw_init_rad = self.jumps[0].start_yaw_rad;
-        let moved = jump.now_world - jump.start_world;
-        let (sin, cos) = yaw_init_rad.sin_cos();
-        let turned_rad = jump.now_yaw_rad - jump.start_yaw_rad;
-        match task {
-            Task::Forward => cos * moved.x + sin * moved.y,
-            Task::LateralLeft => cos * moved.y - sin * moved.x,
-            Task::LateralRight => sin * moved.x - cos * moved.y,
-            Task::TwistCcw => turned_rad,
-            Task::TwistCw => -turned_rad,
-        }
+        let moved = about_z(-yaw_init_rad) * (jump.now_world - jump.start_world);
+        let dyaw_rad = jump.now_yaw_rad - jump.start_yaw_rad;
+        along(task, &Displacement { time_s: self.time_s, dx_m: moved.x, dy_m: moved.y, dyaw_rad })
     }
 }

@@ -1,6 +1,6 @@
 //! The trial that has just landed, fitted to the charts until it has its verdict.
 
-use super::comparison::{impulse_start_ns, time_after};
+use super::comparison::impulse_start_ns;
 use super::history::{BEFORE_IMPULSE_S, ChartSample, SignalHistory};
 
 /// The samples of a landed trial, from shortly before its impulse to rest.
@@ -40,7 +40,7 @@ impl<'a> LandedTrial<'a> {
     pub fn moved_cursor_ns(&self, cursor_ns: Option<u64>, step: i64) -> u64 {
         let (first, last) = self.span_ns();
         let step_ns = ((last - first) as i64 / 100).max(1) * step;
-        let from_ns = cursor_ns.unwrap_or_else(|| time_after(self.start_ns, 0.0));
+        let from_ns = cursor_ns.unwrap_or(self.start_ns);
         from_ns.saturating_add_signed(step_ns).clamp(first, last)
     }
 }
