@@ -279,6 +279,13 @@ fn a_missing_file_is_named_in_words_and_the_usage_says_what_is_required() {
     }
 }
 
+/// Regression: the observed simulator stood still above its ground, since nothing commands it, and was shown as live.
+#[test]
+fn a_simulated_robot_is_not_observed() {
+    let remedy = "add --robot go1 or --robot go2, or watch a running session: quadfrog attach";
+    assert_shows(&Program::new().refused(&["--observe"]), &["--observe: the simulated robot", remedy]);
+}
+
 /// Regression: a wrong number was refused with "invalid digit found in string".
 #[test]
 fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {

@@ -79,7 +79,7 @@ impl Drop for RecordingRobot {
 }
 
 /// The Go1 with any local port, so that tests can run in parallel.
-fn model(folder: &Path) -> PathBuf {
+pub fn model(folder: &Path) -> PathBuf {
     let model = folder.join("model");
     std::fs::create_dir(&model).unwrap();
     for file in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/go1")).unwrap() {

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::path::Path;
 
+use crate::guard;
 use crate::program::{Program, assert_shows};
 use crate::pty::Session;
 use crate::python_reader::read_by_python;
@@ -77,7 +78,15 @@ fn a_viewer_in_python_gets_the_topics_of_the_recording() {
 
 #[test]
 fn an_observer_that_records_nothing_is_shown_too() {
-    let (folder, session, port) = shown(&["--observe"]);
+    // A robot that never answers.
+    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = silent.local_addr().unwrap().to_string();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let model = guard::model(elsewhere.path());
+    // In place of the user's own configuration of the tests, which is refused on hardware.
+    let config = concat!(env!("CARGO_MANIFEST_DIR"), "/../config");
+    let robot = ["--robot", "go1", "--address", &address, "--model", model.to_str().unwrap(), "--config", config];
+    let (folder, session, port) = shown(&[&["--observe"], &robot[..]].concat());
     let found = viewed(port);
     end(session);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");

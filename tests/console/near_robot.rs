@@ -85,6 +85,20 @@ fn an_observers_stop_is_a_request_and_its_effect_is_shown() {
     assert!(step.starts_with("NOT STOPPED: ") && step.contains(" holds -12.3 N m, another console"), "{step}");
 }
 
+/// Regression: beside `STOP Space F12` an observer's session "can change nothing", and its arming checks ran "while the robot is
+/// disarmed".
+#[test]
+fn an_observer_is_shown_the_one_key_that_reaches_the_robot_and_no_arming() {
+    let mut observer = Console::new();
+    observer.record(Record::Session(SessionInfo { observe: true, ..session() }));
+    observer.mode(Mode::Observe);
+    assert!(observer.next_step().contains("of the keys STOP alone reaches the robot"), "{}", observer.next_step());
+    observer.press(&["5"]);
+    assert_shows(&observer.screen(120, 40), &["not checked: a session that only observes does not arm"]);
+    observer.press(&["P"]);
+    assert_shows(&observer.screen(120, 40), &["Arming checks: none of an observer"]);
+}
+
 #[test]
 fn control_of_a_real_robot_is_taken_with_a_key_after_a_second_of_listening() {
     for mode in [Mode::Offline, Mode::Observe] {

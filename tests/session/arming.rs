@@ -468,7 +468,9 @@ fn an_observer_may_stop_and_then_lets_go_of_the_robot() {
     assert_eq!((session.body.mode(), session.robot.writes), (Mode::Damped, 50));
     let answer = session.request(OperatorRequest::Arm);
     assert!(!answer.accepted && answer.answer.contains("only observes"), "{answer:?}");
-    assert!(session.request(OperatorRequest::Acknowledge).accepted);
+    let answer = session.request(OperatorRequest::Acknowledge);
+    // Regression: the answer was "disarmed; arm when ready".
+    assert!(answer.accepted && answer.answer == "nothing is sent any more", "{answer:?}");
     session.ticks(10);
     assert_eq!(session.body.mode(), Mode::Observe);
     let writes = session.robot.writes;

@@ -53,7 +53,10 @@ pub fn lines(model: &Model, width: usize, few: usize) -> Vec<Line<'static>> {
         items.truncate(few.saturating_sub(1));
     }
     if items.is_empty() {
-        let text = " not checked yet: the checks run while the robot is disarmed";
+        let text = match model.session.info.observe {
+            true => " not checked: a session that only observes does not arm",
+            false => " not checked yet: the checks run while the robot is disarmed",
+        };
         return wrap(&Line::from(span(&model.theme, Role::Quiet, text)), width, 1);
     }
     // Half of a narrow terminal has room for the found value alone.
@@ -146,6 +149,7 @@ fn result(model: &Model) -> String {
     let session = &model.session;
     let needed = session.arming_checks.iter().filter(|item| item.state != ArmingCheckState::NotNeeded).count();
     match (session.arming_checks.is_empty(), session.failing_checks()) {
+        (true, _) if session.info.observe => "none of an observer".to_owned(),
         (true, _) => "not yet".to_owned(),
         (false, 0) => format!("{needed} passed"),
         (false, count) => format!("{count} of {needed} not yet"),

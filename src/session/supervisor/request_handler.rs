@@ -56,7 +56,7 @@ impl Supervisor {
             OperatorRequest::Acknowledge => self.ask(
                 Trigger::Acknowledge,
                 Command::Acknowledge { stops: stamped.stops },
-                "disarmed; arm when ready",
+                if self.observe { "nothing is sent any more" } else { "disarmed; arm when ready" },
             ),
             OperatorRequest::Cancel => self.lower(Lowering::Cancel),
             OperatorRequest::TakeControl => match self.mode {

@@ -133,7 +133,7 @@ pub struct ConsoleArguments {
     /// Continue a study that was made on another robot, or between simulator and robot
     #[arg(long, requires = "resume")]
     accept_backend_change: bool,
-    /// Observe only
+    /// Observe only: a robot of `--robot go1` or `--robot go2` is sent nothing but the damping of a STOP
     #[arg(long, conflicts_with_all = ["resume", "approve"])]
     observe: bool,
     /// Jumps that wait for the operator's approval and verdict
@@ -151,6 +151,11 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         Machine::Simulator => (Backend::Simulator, DEFAULT_MODEL),
         Machine::Robot(robot) => (Backend::Hardware, robot.name()),
     };
+    if arguments.observe && backend == Backend::Simulator {
+        let text =
+            "--observe: the simulated robot moves by this session's commands alone; add --robot go1 or --robot go2";
+        return Err(Failure::input(format!("{text}, or watch a running session: quadfrog attach")));
+    }
     let model = arguments.study.model.as_deref().unwrap_or(model);
     let (files, robot) = arguments::load_model(model)?;
     let (config, continued) = arguments.study.load_config(&files, arguments.resume.as_deref())?;

@@ -73,7 +73,7 @@ fn without_row(model: &Model) -> NextStep {
         None if model.replay.is_some() => replay(model),
         None if model.session.info.observe && model.stop_requested() => observers_stop(model),
         None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
-            step("Observing: this session can change nothing.", model, &[QUIT])
+            step("Observing: of the keys STOP alone reaches the robot.", model, &[QUIT])
         }
         None => live(model),
     }
