@@ -58,6 +58,16 @@ fn a_trial_that_was_not_run_has_no_signals_to_show() {
     assert_eq!(console.said(), "trial 1 was not run");
 }
 
+/// Regression: a queued trial that ran before the last repeat was passed over in silence.
+#[test]
+fn a_result_names_a_queued_trial_that_ran_before_the_repeats_and_is_higher() {
+    let mut console = compared();
+    let row = TrialRecord { value: Some(0.706), ..trial(19, Some(Verdict::Accept), None) };
+    console.record(Record::Trial(row));
+    console.stage(ExperimentStage::Finished, 22);
+    assert_shows(console.said(), &["stood 2 of 2; trial 19, not compared, is higher: 0.706 m"]);
+}
+
 fn point(trials: Vec<u32>, mean: f64, confidence: Option<f64>) -> PointRecord {
     PointRecord {
         parameters: vec![("f0".into(), 1.25)].into(),
@@ -116,11 +126,11 @@ fn a_result_says_that_a_later_trial_is_higher() {
         console.said(),
         &["the point of trial 17 leads without a confidence: mean 0.688 +- 0.000 m, stood 2 of 2"],
     );
-    assert!(!console.said().contains("later"), "{}", console.said());
+    assert!(!console.said().contains("not compared"), "{}", console.said());
     later(&mut console, 28, 0.706);
     console.stage(ExperimentStage::Proposed, 29);
     console.stage(ExperimentStage::Finished, 28);
-    assert_shows(console.said(), &["stood 2 of 2; trial 28, later, is higher: 0.706 m"]);
+    assert_shows(console.said(), &["stood 2 of 2; trial 28, not compared, is higher: 0.706 m"]);
 }
 
 /// Regression: three repeats over three points could decide nothing, which was said afterwards alone.

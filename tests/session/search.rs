@@ -537,8 +537,37 @@ fn the_result_of_a_confirmation_is_said_once_and_names_a_later_trial_that_is_hig
     assert_eq!(news.log.iter().filter(|line| line.contains("used up")).count(), 1, "{:?}", news.log);
     experiment.close().unwrap();
     let kept = confirmation_in_words(&study_in(folder.path()), 0.95).expect("it is kept");
-    let later = format!("; each point needs 3 jumps to be compared; trial {}, later, is higher: 5.000", spec.trial);
+    let later =
+        format!("; each point needs 3 jumps to be compared; trial {}, not compared, is higher: 5.000", spec.trial);
     assert!(kept.ends_with(&later) && kept.contains("leads without a confidence"), "{kept}");
+}
+
+/// Regression: a queued point, which runs before the repeats and is higher than all of them, was in no text of the result.
+#[test]
+fn the_result_of_a_confirmation_names_a_higher_trial_that_ran_before_the_repeats() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = open(folder.path());
+    let jumps_to = |experiment: &mut Experiment, value: f64| {
+        let spec = approve(experiment);
+        experiment.ended(spec.trial, &TrialEnd::Settled, &ticks(spec.trial, value), 2);
+        experiment.judge(Verdict::Accept, false).unwrap();
+        spec.trial
+    };
+    for value in [0.5, 0.2] {
+        jumps_to(&mut experiment, value);
+    }
+    experiment.enqueue(&[("f0".into(), 1.1), ("Fx".into(), 100.0), ("Fz".into(), 240.0)]).unwrap();
+    experiment.confirm_best(4).unwrap();
+    let queued = jumps_to(&mut experiment, 0.9);
+    while experiment.proposal().is_some_and(|proposal| proposal.source == ProposalSource::Confirm) {
+        jumps_to(&mut experiment, 0.4);
+    }
+    let higher = format!("; trial {queued}, not compared, is higher: 0.900");
+    let said = experiment.take_conclusion().expect("the last repeat has ended it");
+    assert!(said.contains("the point of trial 0 leads") && said.contains(&higher), "{said}");
+    experiment.close().unwrap();
+    let kept = confirmation_in_words(&study_in(folder.path()), 0.95).expect("it is kept");
+    assert!(kept.contains(&higher), "{kept}");
 }
 
 /// The last repeat can be judged otherwise: what was concluded from it is then concluded anew.

@@ -107,7 +107,8 @@ impl BestConfirmation {
         let over = |sure: bool, message: String| {
             let Lead { point, confidence } = lead;
             let (trials, leader) = (running.trials.clone(), compared[point].trials[0]);
-            NextRepeat::Over(Conclusion { trials, leader, confidence, sure, wanted: Some(self.confidence) }, message)
+            let conclusion = Conclusion { trials, leader, confidence, sure, wanted: Some(self.confidence) };
+            NextRepeat::Over(conclusion, message + &better_in_words(study, &compared, point))
         };
         if compared.len() < 2 {
             let message = format!("only the point of trial {} is left to compare: nothing to confirm", first.trials[0]);
@@ -211,20 +212,19 @@ pub fn confirmation_in_words(study: &Study, confidence: f64) -> Option<String> {
         true => String::new(),
     };
     let text = lead_text(&points, lead, unit_of(study));
-    Some(text + &short + &later_in_words(study, &points, lead.point))
+    Some(text + &short + &better_in_words(study, &points, lead.point))
 }
 
-/// Returns in words the best point that was first run after the last repeat, if it is better than the leading one.
-fn later_in_words(study: &Study, compared: &[RepeatedPoint], leader: usize) -> String {
+/// Returns in words the best point that was not compared, if it is better than the leading one.
+fn better_in_words(study: &Study, compared: &[RepeatedPoint], leader: usize) -> String {
     let direction = study.options().direction;
-    let last = compared.iter().flat_map(|point| &point.trials).max();
-    let is_later = |point: &RepeatedPoint| point.without_fall > 0 && point.trials.first() > last;
-    let later = contenders(study.trials(), direction, usize::MAX, None).into_iter().find(is_later);
-    match later.filter(|point| direction.best_first(point.mean(), compared[leader].mean()).is_lt()) {
+    let is_other = |point: &RepeatedPoint| point.without_fall > 0 && !compared.contains(point);
+    let other = contenders(study.trials(), direction, usize::MAX, None).into_iter().find(is_other);
+    match other.filter(|point| direction.best_first(point.mean(), compared[leader].mean()).is_lt()) {
         Some(point) => {
             let better = if direction == Direction::Maximize { "higher" } else { "lower" };
             let (trial, mean, unit) = (point.trials[0], point.mean(), unit_of(study));
-            format!("; trial {trial}, later, is {better}: {mean:.3} {unit}").trim_end().to_owned()
+            format!("; trial {trial}, not compared, is {better}: {mean:.3} {unit}").trim_end().to_owned()
         }
         None => String::new(),
     }

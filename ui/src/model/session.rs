@@ -283,14 +283,12 @@ impl SessionModel {
         let (first, mean, stood, of) = (point.trials.first()?, point.mean, point.without_fall, point.trials.len());
         let lead =
             format!("the point of trial {first} leads {sure}: mean {mean:.3}{spread} {unit}, stood {stood} of {of}");
-        // Those that were first run after the last repeat.
-        let last =
-            self.trials.points.iter().filter(|point| point.contender).filter_map(|point| point.trials.last()).max();
-        let is_later = |trial: &u32| Some(trial) > last;
-        let later = self.trials.best_so_far().last().filter(|best| is_later(&best.trial));
-        let later = later.and_then(|best| best.value.map(|value| (best.trial, value)));
-        match later.filter(|(_, value)| *value > mean) {
-            Some((trial, value)) => Some(format!("{lead}; trial {trial}, later, is higher: {value:.3} {unit}")),
+        let is_compared =
+            |trial: u32| self.trials.points.iter().any(|point| point.contender && point.trials.contains(&trial));
+        let other = self.trials.best_so_far().last().filter(|best| !is_compared(best.trial));
+        let other = other.and_then(|best| best.value.map(|value| (best.trial, value)));
+        match other.filter(|(_, value)| *value > mean) {
+            Some((trial, value)) => Some(format!("{lead}; trial {trial}, not compared, is higher: {value:.3} {unit}")),
             None => Some(lead),
         }
     }
