@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::config::{Config, ConfigLayer};
 use crate::recording::RecordingError;
 use crate::recording::difference::difference;
-use crate::recording::player::{Played, Player};
+use crate::recording::player::{Damage, Played, Player};
 use crate::recording::record::Record;
 use crate::robot::description::{RobotDescription, RobotFiles};
 use crate::session::experiment::next_seed;
@@ -65,6 +65,8 @@ pub enum VerifyError {
         path.display()
     )]
     NotAttached { path: PathBuf, name: String },
+    #[error("{}: not verifiable: it is damaged: {}", .0.path.display(), .0.parts)]
+    Damaged(Damage),
     #[error("{}: not verifiable: {reason}", path.display())]
     NotVerifiable { path: PathBuf, reason: String },
 }
@@ -135,8 +137,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     }
     let Some(task) = session.task else { return Err(refuse("its task is not known to this version".into())) };
     let (config, robot) = (attached_config(&mut player)?, attached_robot(&mut player)?);
-    let damaged =
-        |player: &Player| player.damage().map_or(Ok(()), |damage| Err(refuse(format!("it is damaged: {damage}"))));
+    let damaged = |player: &Player| player.damage().map_or(Ok(()), |damage| Err(VerifyError::Damaged(damage)));
     damaged(&player)?;
 
     let settings = config.settings(&robot, task, Backend::Simulator).map_err(|error| refuse(error.to_string()))?;

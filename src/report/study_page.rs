@@ -10,6 +10,9 @@ use super::table::{self, changed_bounds};
 use crate::optimize::ask::Direction;
 use crate::trial::{ParameterInfo, Task, counted, six_digits};
 
+/// Ways to record the ticks of every trial: the remedy of messages about a trial without ticks.
+pub const WAYS_TO_RECORD_EVERY_TRIAL: &str = "`quadfrog optimize --record all` and the console record every trial";
+
 /// Returns the report of `studies`, at least one; `choices`: the trials whose ticks are drawn; `version`: that of the program
 /// that writes the report, with its commit.
 pub fn page(studies: &[ReportedStudy], choices: &[TrialChoice], version: &str) -> Page {
@@ -169,28 +172,32 @@ fn ticks(study: &ReportedStudy, trials: &[DrawnTrial]) -> String {
     let without_curves = trials.iter().filter(|trial| trial.curves.is_none()).map(|trial| trial.row.trial);
     let (without_jump, missing): (Vec<u32>, Vec<u32>) = without_curves.partition(|trial| study.has_ticks_of(*trial));
     let in_part = study.trials().map(|row| row.trial).filter(|trial| study.recordings.in_part.contains(trial));
-    let [without_jump, missing, in_part] = [without_jump, missing, in_part.collect()]
-        .map(|trials: Vec<u32>| trials.iter().map(u32::to_string).collect::<Vec<_>>())
-        .map(|trials| trials.join(", "));
+    let in_part: Vec<u32> = in_part.collect();
     let recorded = study.trials().filter(|row| study.has_ticks_of(row.trial)).count();
-    let in_part = if in_part.is_empty() { String::new() } else { format!(", of trial {in_part} in part") };
+    let in_part = if in_part.is_empty() { String::new() } else { format!(", of {} in part", numbered(&in_part)) };
     let recorded = format!("Ticks of {recorded} of {} are recorded{in_part}", counted(study.trials().count(), "trial"));
-    let end = match without_jump.as_str() {
-        "" => String::new(),
-        trials => format!(" The ticks of trial {trials} end before the impulse: there is no jump to draw."),
+    let end = match without_jump.as_slice() {
+        [] => String::new(),
+        trials => format!(" The ticks of {} end before the impulse: there is no jump to draw.", numbered(trials)),
     };
-    let text = match (study.recordings.files.is_empty(), missing.len()) {
-        (true, _) => "No recording of this study exists: motion, torque and power cannot be drawn. `quadfrog optimize \
-                      --record all` and the console record ticks."
-            .to_owned(),
-        (false, 0) => format!("{recorded}."),
-        (false, _) => format!(
-            "{recorded}; those of trial {missing} are missing: its motion, torque and power cannot be drawn. They were not \
-             recorded (`quadfrog optimize --record all` and the console record every trial), or are in a file that is damaged or \
-             was taken away."
+    let text = match (study.recordings.files.is_empty(), missing.as_slice()) {
+        (true, _) => format!(
+            "No recording of this study exists: motion, torque and power cannot be drawn; {WAYS_TO_RECORD_EVERY_TRIAL}."
+        ),
+        (false, []) => format!("{recorded}."),
+        (false, missing) => format!(
+            "{recorded}; those of {} are missing: motion, torque and power cannot be drawn. They were not recorded \
+             ({WAYS_TO_RECORD_EVERY_TRIAL}), or are in a file that is damaged or was taken away.",
+            numbered(missing)
         ),
     };
     text + &end
+}
+
+/// Returns trials in words: `trial 3` or `trials 0, 16`.
+fn numbered(trials: &[u32]) -> String {
+    let numbers: Vec<String> = trials.iter().map(u32::to_string).collect();
+    format!("trial{} {}", if trials.len() == 1 { "" } else { "s" }, numbers.join(", "))
 }
 
 fn verdicts(studies: &[ReportedStudy]) -> Section {

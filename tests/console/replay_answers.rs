@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use crate::program::Program;
 use crate::pty::Session;
-use crate::support::{Console, assert_shows};
+use crate::support::{Console, assert_shows, trial};
 use portable_pty::CommandBuilder;
 use quadfrog::engine::ObserverStatus;
 use quadfrog::recording::record::{LogLevel, LogRecord, Record};
+use quadfrog::trial::Verdict;
 use quadfrog_console::message::{Msg, ReplayStatus, ReplayTimeline};
 
 const NO_FURTHER: &str = "no further fall or fault";
@@ -50,6 +51,19 @@ fn the_answer_to_a_key_in_a_replay_stays_until_it_is_read() {
     console.update(Msg::Rewound);
     console.wait(5000);
     assert_eq!(console.said(), "");
+}
+
+/// Regression: the trials of `quadfrog optimize`, which records the ticks of the best one alone, were "of another session".
+#[test]
+fn a_trial_without_ticks_in_a_replay_is_not_of_another_session() {
+    let mut console = replayed();
+    console.record(Record::Trial(trial(13, Some(Verdict::Accept), None)));
+    console.press(&["6"]);
+    assert_shows(&console.screen(120, 40), &["trial 13 without ticks: accept"]);
+    console.press(&["2", "Home", "Enter"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["not in this recording"]);
+    assert!(!screen.contains("session"), "{screen}");
 }
 
 /// Regression: `u takes it back` in a replay was read as an answer to who watches.

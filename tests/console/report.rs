@@ -233,6 +233,17 @@ fn trials_without_ticks_are_named() {
     let other = if best["number"] == 3 { 2 } else { 3 };
     let text = program.text(&["report", &study, "--trials", &format!("best,{other}")]).replace('\n', " ");
     assert_shows(&text, &["Ticks of 1 of 4 trials are recorded", &format!("those of trial {other} are missing")]);
+    // Regression: several were "those of trial 0, 2", and its motion could not be drawn.
+    let [first, second] = if best["number"].as_u64() > Some(1) { [0, 1] } else { [2, 3] };
+    let text = program.text(&["report", &study, "--trials", &format!("best,{first},{second}")]).replace('\n', " ");
+    assert_shows(&text, &[&format!("those of trials {first}, {second} are missing: motion, torque and power cannot")]);
+    // Regression: a picture was refused with "no trial 3", signals without the remedy.
+    let (other, best) = (other.to_string(), &best["number"]);
+    for command in ["screenshot", "export"] {
+        let refused = program.refused(&[command, &study, "--trial", &other]);
+        let known = format!("no tick of trial {other} is recorded; trials with ticks: {best}");
+        assert_shows(&refused, &[&known, "`quadfrog optimize --record all` and the console record every trial"]);
+    }
 }
 
 #[test]

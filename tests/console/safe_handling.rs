@@ -68,6 +68,10 @@ fn a_recording_of_a_running_session_is_not_called_damaged() {
     assert_eq!(export.status.code(), Some(0), "{message}");
     assert_shows(&message, &["session.mcap.part: a session still writes it; it is exported up to"]);
     assert!(!message.contains("recover"), "{message}");
+    // Regression: `verify` called it damaged and named the file twice.
+    let refused = program.refused(&["verify", study.to_str().unwrap()]);
+    assert_shows(&refused, &["session.mcap.part: not verifiable: a session still writes it"]);
+    assert_eq!(refused.matches("mcap.part").count(), 1, "{refused}");
     let mut command = CommandBuilder::new(env!("CARGO_BIN_EXE_quadfrog"));
     command.args(["replay", part.to_str().unwrap()]);
     let mut replay = Session::run(&program.path("."), SIZE, command);
@@ -107,6 +111,8 @@ fn a_leftover_of_a_killed_session_is_damaged_also_beside_the_session_that_contin
     session.send("1");
     let written = study.join("session-2.mcap.part");
     assert_shows(&program.text(&["replay", "--check", written.to_str().unwrap()]), &["a session still writes it"]);
+    let refused = program.refused(&["verify", left.to_str().unwrap()]);
+    assert_shows(&refused, &["not verifiable: it is damaged: its end was not written", "`quadfrog recover"]);
     // By the name alone, too.
     let output = program.command(&["replay", "--check", "session-2.mcap.part"]).current_dir(&study).output().unwrap();
     assert_eq!(output.status.code(), Some(0));

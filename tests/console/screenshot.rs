@@ -137,7 +137,7 @@ fn wrong_input_is_refused_with_the_remedy() {
     let sample = sample();
     let refused =
         |arguments: &[&str]| program.refused(&[&["screenshot", sample.to_str().unwrap()], arguments].concat());
-    assert_shows(&refused(&["--trial", "99"]), &["no trial 99", "its trials: 12"]);
+    assert_shows(&refused(&["--trial", "99"]), &["no trial 99", "trials with ticks: 12"]);
     assert_shows(&refused(&["--size", "120"]), &["COLUMNSxROWS", "for example 120x40"]);
     assert_shows(&refused(&["--size", "9999x9999"]), &["to 400x200"]);
     assert_shows(&refused(&["--keys", "2 Entr"]), &["`Entr` is no key"]);

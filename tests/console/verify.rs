@@ -170,7 +170,8 @@ fn damage_is_no_difference_of_the_simulation() {
     std::fs::write(program.path("damaged.mcap"), bytes).unwrap();
     let (status, _, error) = verified(&program, &program.path("damaged.mcap"));
     assert_eq!(status, Some(2), "{error}");
-    assert_shows(&error, &["damaged.mcap: not verifiable: it is damaged", "1 of "]);
+    assert_shows(&error, &["damaged.mcap: not verifiable: it is damaged: 1 of "]);
+    assert_shows(&error, &["; `quadfrog recover ", "damaged.mcap` keeps what can be read"]);
     assert!(!error.contains("in the simulation"), "{error}");
     // Regression: once the file was recovered they were.
     program.text(&["recover", "damaged.mcap"]);

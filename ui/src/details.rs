@@ -21,7 +21,7 @@ pub fn lines(model: &Model, trial: u32, width: usize) -> Option<Vec<Line<'static
     let record = model.final_row(trial)?;
     let again = model.rejudged.as_ref().and_then(|table| table.trials.get(&trial));
     let overrides = model.timeline.as_ref().map_or(&model.session.overrides, |timeline| &timeline.overrides);
-    let rows = details(&model.session, &model.theme, record, overrides).into_iter().chain(rejudged(again));
+    let rows = details(model, record, overrides).into_iter().chain(rejudged(again));
     let line = |(name, value): (String, String)| {
         Line::from(vec![span(&model.theme, Role::Quiet, format!("{name:<NAME_WIDTH$}")), Span::raw(value)])
     };
@@ -29,7 +29,8 @@ pub fn lines(model: &Model, trial: u32, width: usize) -> Option<Vec<Line<'static
     Some(rows.flat_map(|row| wrap(&line(row), width, NAME_WIDTH)).collect())
 }
 
-fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord, overrides: &Overrides) -> Vec<(String, String)> {
+fn details(model: &Model, trial: &TrialRecord, overrides: &Overrides) -> Vec<(String, String)> {
+    let Model { session, theme, .. } = model;
     let overrides = overrides.of(trial);
     let proposed = |name: &str| {
         let overridden = overrides.iter().find(|p| p.name == name);
@@ -97,7 +98,12 @@ fn details(session: &SessionModel, theme: &Theme, trial: &TrialRecord, overrides
         let what = if trial.did_not_jump() { "the countdown alone, " } else { "" };
         row("ran", format!("{what}at {} of the session{took}", clock(ran.begun_ns)));
     } else if trial.verdict.is_some() {
-        row("ran", if trial.was_not_run() { "not at all" } else { "not in this session" }.to_owned());
+        let ran = match (trial.was_not_run(), model.replay.is_some()) {
+            (true, _) => "not at all",
+            (false, true) => "not in this recording",
+            (false, false) => "not in this session",
+        };
+        row("ran", ran.to_owned());
     }
     for (name, value) in &trial.parameters {
         let index = session.info.parameters.iter().position(|info| info.name == *name);

@@ -1,5 +1,6 @@
 //! Damage of recordings, as the commands report it that use what is left.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
 use anyhow::anyhow;
@@ -27,11 +28,15 @@ pub fn damage_text(damage: &[Damage], done: &str) -> String {
 }
 
 fn lines(damage: &[Damage]) -> Vec<String> {
-    let line = |damage: &Damage| match damage.is_recoverable {
-        true => format!("{damage}; `quadfrog recover {}` keeps what can be read", damage.path.display()),
-        false => damage.to_string(),
-    };
-    damage.iter().map(line).collect()
+    damage.iter().map(|damage| with_repair(damage, damage)).collect()
+}
+
+/// Returns a text about damage with the command that repairs it, if there is one.
+pub fn with_repair(text: &impl Display, damage: &Damage) -> String {
+    match damage.is_recoverable {
+        true => format!("{text}; `quadfrog recover {}` keeps what can be read", damage.path.display()),
+        false => text.to_string(),
+    }
 }
 
 fn text(lines: &[String], done: &str) -> String {

@@ -20,7 +20,7 @@ use super::completion;
 use super::damage::require_whole;
 use super::failure::Failure;
 use super::output_file::write_file;
-use super::replay::{is_written, lacks_its_end_alone};
+use super::replay::{is_written, lacks_its_end_alone, without_ticks};
 use super::table::{table_format, written_format};
 
 /// Viewer with a layout for recordings.
@@ -177,5 +177,5 @@ fn require_trial(players: &[Player], trial: u32) -> Result<(), String> {
     }
     let known = trials.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
     let known = if known.is_empty() { "none".to_owned() } else { known };
-    Err(format!("no tick of trial {trial} is recorded; trials with ticks: {known}"))
+    Err(without_ticks(trial, &known))
 }

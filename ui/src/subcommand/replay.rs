@@ -16,6 +16,7 @@ use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Damage, Played, Player};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
 use quadfrog::recording::timeline::Timeline;
+use quadfrog::report::study_page::WAYS_TO_RECORD_EVERY_TRIAL;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::counted;
 
@@ -177,6 +178,11 @@ pub fn is_written(file: &Path) -> bool {
     file.extension().is_some_and(|extension| extension == "part")
         && newest.is_some_and(|newest| newest.file_name() == file.file_name())
         && matches!(running_session(folder), Ok(Some(_)))
+}
+
+/// Returns the refusal of a trial of which no tick is recorded; `known` are the trials with ticks.
+pub fn without_ticks(trial: u32, known: &str) -> String {
+    format!("no tick of trial {trial} is recorded; trials with ticks: {known}; {WAYS_TO_RECORD_EVERY_TRIAL}")
 }
 
 /// Whether nothing is missing in a recording but its end.

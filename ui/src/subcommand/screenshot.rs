@@ -16,14 +16,13 @@ use crate::{notice, output};
 use clap::Args;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::recording::timeline::Timeline;
-use quadfrog::trial::TrialRecord;
 
 use super::arguments::{self, whole_number};
 use super::console::{settings, theme};
 use super::damage::{require_whole, without_present_ends};
 use super::failure::Failure;
 use super::output_file::{require_format, write_file};
-use super::replay::{is_written, recorded_robot};
+use super::replay::{is_written, recorded_robot, without_ticks};
 
 /// Of the pictures.
 const EXTENSION: &str = "svg";
@@ -163,9 +162,10 @@ fn end_of(trial: u32, recording: &Timeline) -> Result<u64, String> {
     runs.iter().rev().find(|run| run.trial == trial).map(|run| run.end_ns).ok_or_else(|| {
         let known = runs.iter().map(|run| run.trial.to_string()).collect::<Vec<_>>().join(", ");
         let known = if known.is_empty() { "none" } else { &known };
-        match recording.rows().get(&trial).is_some_and(TrialRecord::was_not_run) {
-            true => format!("trial {trial} was not run; trials that ran: {known}"),
-            false => format!("no trial {trial}; its trials: {known}"),
+        match recording.rows().get(&trial) {
+            Some(row) if row.was_not_run() => format!("trial {trial} was not run; trials with ticks: {known}"),
+            Some(_) => without_ticks(trial, known),
+            None => format!("no trial {trial}; trials with ticks: {known}"),
         }
     })
 }

@@ -11,7 +11,9 @@ use quadfrog::recording::RecordingError;
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::trial::counted;
 
+use super::damage::with_repair;
 use super::failure::Failure;
+use super::replay::is_written;
 
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
@@ -48,7 +50,12 @@ enum VerifyFailure {
 
 fn verify(path: &Path) -> Result<(), VerifyFailure> {
     let file = path.display();
+    let written = is_written(path);
     let verified = engine::verify(path).map_err(|error| match error {
+        VerifyError::Damaged(_) if written => VerifyFailure::Other(Failure::input(format!(
+            "{file}: not verifiable: a session still writes it; verify it once that session has ended"
+        ))),
+        VerifyError::Damaged(ref damage) => VerifyFailure::Other(Failure::input(with_repair(&error, damage))),
         VerifyError::Recording(RecordingError::Io { ref source, .. }) if source.kind() != ErrorKind::NotFound => {
             VerifyFailure::Other(Failure::Other(error.into()))
         }

@@ -369,7 +369,12 @@ fn log_trial(model: &mut Model, time_ns: u64, trial: &TrialRecord) {
             };
             // A study that is continued begins with the rows of the sessions before; other workers add theirs.
             let ran_elsewhere = !trial.was_not_run() && !model.session.trials.ran.contains_key(&trial.trial);
-            let of = if ran_elsewhere { " of another session" } else { "" };
+            let of = match (ran_elsewhere, model.replay.is_some()) {
+                (false, _) => "",
+                (true, false) => " of another session",
+                // Of `quadfrog optimize`, for example, that records the ticks of the best trial alone.
+                (true, true) => " without ticks",
+            };
             let by_hand = if trial.counts_by_hand() { " by hand" } else { "" };
             let verdict = trial.verdict_name().unwrap_or(verdict.name());
             format!("trial {}{of}{source}: {verdict}{value}{by_hand}", trial.trial)
