@@ -1,5 +1,7 @@
 //! A page as text for a terminal.
 
+use std::collections::BTreeSet;
+
 use super::page::{Block, Cell, Column, Page, Table};
 use crate::printable::{is_unprintable, printable};
 
@@ -62,7 +64,7 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Returns a table in columns; one that is wider than `width` continues below with its first column repeated.
+/// Returns a table in columns; one that is wider than `width` continues below with the columns that name a row repeated.
 fn table(table: &Table, width: usize) -> String {
     let cell = |row: &[Cell], at: usize| row.get(at).map_or_else(String::new, |cell| printable(&cell.shown()));
     let natural: Vec<usize> = (0..table.columns.len())
@@ -72,7 +74,7 @@ fn table(table: &Table, width: usize) -> String {
         })
         .collect();
     let mut text = if table.caption.is_empty() { String::new() } else { paragraph(&table.caption, width, "") };
-    for (part, group) in groups(&natural, &table.columns, width).into_iter().enumerate() {
+    for (part, group) in groups(&natural, table, width).into_iter().enumerate() {
         if part > 0 {
             text.push('\n');
         }
@@ -135,15 +137,28 @@ fn header(column: &Column, width: usize) -> Vec<String> {
     lines
 }
 
-/// Returns the columns that stand side by side; the first column begins each group.
-fn groups(natural: &[usize], columns: &[Column], width: usize) -> Vec<Vec<usize>> {
+/// Returns the number of columns that name a row: the first one, and the columns of text after it that tell rows with equal names
+/// apart; the first one alone where none do.
+fn name_columns(table: &Table) -> usize {
+    let texts = table.columns.iter().skip(1).take_while(|column| column.text).count();
+    let differ = |count: &usize| {
+        let name = |row: &Vec<Cell>| row.iter().take(*count).map(Cell::shown).collect::<Vec<_>>();
+        let names: BTreeSet<_> = table.rows.iter().map(name).collect();
+        names.len() == table.rows.len()
+    };
+    (1..=1 + texts).find(differ).unwrap_or(1)
+}
+
+/// Returns the columns that stand side by side; the columns that name a row begin each group.
+fn groups(natural: &[usize], table: &Table, width: usize) -> Vec<Vec<usize>> {
+    let (columns, names) = (&table.columns, name_columns(table));
     let needed = |at: usize| if columns[at].text { natural[at].min(LEAST_TEXT) } else { natural[at] } + 2;
     let mut groups: Vec<Vec<usize>> = vec![Vec::new()];
     let mut used = 0;
     for at in 0..natural.len() {
-        if at > 1 && used + needed(at) > width + 2 && groups.last().is_some_and(|group| group.len() > 1) {
-            groups.push(vec![0]);
-            used = needed(0);
+        if used + needed(at) > width + 2 && groups.last().is_some_and(|group| group.len() > names) {
+            groups.push((0..names).collect());
+            used = (0..names).map(needed).sum();
         }
         used += needed(at);
         groups.last_mut().expect("there is a first group").push(at);

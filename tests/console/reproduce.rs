@@ -51,6 +51,8 @@ fn studies_are_those_of_optimize_and_do_not_depend_on_the_threads() {
     let table = reproduce(one.path(), &[&arguments[..], &["--jobs", "1"]].concat());
     let again = reproduce(two.path(), &[&arguments[..], &["--jobs", "2"]].concat());
     assert_eq!(table.stdout, again.stdout);
+    // Regression: the text had the heading of the configurations, which are in the report alone.
+    assert!(!String::from_utf8_lossy(&table.stdout).contains("Configurations"));
     for file in ["results.json", "report.html", "convergence.svg"] {
         let [one, two] = [one.path(), two.path()].map(|folder| fs::read_to_string(folder.join(file)).unwrap());
         assert!(one == two, "{file} differs");

@@ -146,6 +146,27 @@ fn a_table_wider_than_the_terminal_continues_below_with_its_first_column() {
     assert!(shown.contains("(m)") && shown.contains("11.00"), "{shown}");
 }
 
+/// Regression: a table whose rows need two columns to be told apart continued with the first one alone.
+#[test]
+fn a_continued_table_repeats_every_column_that_names_a_row() {
+    let names = ["configuration", "task"].map(Column::text);
+    let columns = names.into_iter().chain((0..12).map(|i| Column::number(format!("quantity {i}"), "m")));
+    let mut table = Table::new("", columns);
+    for task in ["forward", "lateral"] {
+        let names = ["noisy", task].map(Cell::text);
+        table.rows.push(names.into_iter().chain((0..12).map(|i| Cell::number(f64::from(i), 2))).collect());
+    }
+    let mut section = Section::new("Wide");
+    section.blocks.push(Block::Table(table));
+    let shown = text::render(&Page { sections: vec![section], ..Page::new("Page", "") }, 80);
+    assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
+    let parts = shown.matches("configuration").count();
+    assert!(parts > 1, "{shown}");
+    for task in ["forward", "lateral"] {
+        assert_eq!(shown.matches(&format!("noisy          {task}")).count(), parts, "{shown}");
+    }
+}
+
 #[test]
 fn a_page_as_json_has_unrounded_numbers_and_null_for_none() {
     let json = page().to_json();

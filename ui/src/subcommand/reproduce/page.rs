@@ -307,14 +307,14 @@ fn run_table(results: &ReproduceResults, caption: &str, group: impl Fn(&RunResul
     table
 }
 
-/// The configurations that ran, as keys that differ from the defaults.
+/// The configurations that ran, as keys that differ from the defaults. Its blocks are all folded: a page as text leaves it out.
 fn configurations(results: &ReproduceResults) -> Section {
     let mut used: Vec<ExperimentConfiguration> = results.studies.iter().map(|study| study.job.configuration).collect();
     used.extend(results.runs.iter().map(|run| run.job.configuration));
     used.sort();
     used.dedup();
-    let mut section = Section::new("Configurations");
-    section.paragraph("Keys that differ from the defaults of config/, in the order in which they are laid over them.");
+    let mut section =
+        Section::new("Configurations: keys that differ from the defaults of config/, in the order of their files");
     for configuration in used {
         let text: Vec<String> = configuration.files().map(|(path, text)| format!("# {path}\n{text}")).collect();
         let text = if text.is_empty() { "# the defaults\n".to_owned() } else { text.join("\n") };
