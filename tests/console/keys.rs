@@ -328,6 +328,19 @@ fn every_open_dialog_says_first_that_the_robot_was_stopped() {
     }
 }
 
+/// Regression: at 80 columns the last line of a stopped robot's dialog was cut, or kept the keys that move and dropped the one that acts.
+#[test]
+fn the_acting_keys_of_a_dialog_over_a_stop_are_whole_at_80_columns() {
+    for (key, acts) in [(":", "Enter does it"), ("T", "x switches it on or off")] {
+        let mut console = Console::review(Mode::Review, Verdict::Accept);
+        console.press(&[key]);
+        console.mode(Mode::Damped);
+        let screen = console.screen(80, 24);
+        let last = screen.lines().last().unwrap();
+        assert!(last.contains("k acknowledges. ") && last.contains(acts) && !last.contains(".."), "{key}: {last}");
+    }
+}
+
 #[test]
 fn an_observer_and_a_replay_send_nothing() {
     let all = ["A", "g", "o", "O", "n", "a", "f", "v", "r", "u", "m", "=", "D", "k", "C", "Enter"];

@@ -44,7 +44,7 @@ pub(super) fn line_within(model: &Model, width: usize, view_is_shown: bool) -> L
     }
     let lead = match &model.dialog {
         Some(dialog) => {
-            let asks = !dialog.only_shows() && !matches!(dialog, Dialog::Override(_));
+            let asks = !dialog.only_shows() && !matches!(dialog, Dialog::Override(_) | Dialog::Palette { .. });
             without_parts(&next.lead, width.saturating_sub(1), asks)
         }
         None => next.lead,

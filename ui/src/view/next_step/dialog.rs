@@ -22,7 +22,7 @@ pub(super) fn ends_of_form(dialog: &Dialog) -> Option<&'static str> {
     })
 }
 
-/// The question of a dialog.
+/// The question of a dialog. Of its keys those that move stand before the last one: in a narrow terminal they go first.
 pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
     let key = |action| model.keymap.key(action);
     let close = format!("{} close.", model.keymap.closing_keys());
@@ -41,7 +41,7 @@ pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
             // First, since keys that scroll give way in a narrow terminal.
             let arms = legal(Action::Arm, model).map_or(String::new(), |()| format!("{} arms. ", key(Action::Arm)));
             match model.session.info.is_hardware() {
-                true => format!("{arms}Up Down choose, x confirms, PgUp PgDn Home End scroll, {close}"),
+                true => format!("{arms}x confirms, Up Down choose, PgUp PgDn Home End scroll, {close}"),
                 false => format!("{arms}Up Down PgUp PgDn Home End scroll, {close}"),
             }
         }
@@ -98,11 +98,11 @@ pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
             let space = if model.can_stop() && !model.space_bar_is_text() { " Space is STOP." } else { "" };
             format!("{enter}, Esc cancels.{space}")
         }
-        Dialog::Palette { .. } => "Type to filter, Up Down Home End choose, Enter does it, Esc closes.".to_owned(),
-        Dialog::Choose { .. } => format!("Up Down Home End choose, x switches it on or off, {close}"),
+        Dialog::Palette { .. } => "Type to filter, Enter does it, Up Down Home End choose, Esc closes.".to_owned(),
+        Dialog::Choose { .. } => format!("x switches it on or off, Up Down Home End choose, {close}"),
         Dialog::Queue { .. } if model.session.queue().is_empty() => close,
         Dialog::Queue { .. } if may_request(model).is_err() => format!("Up Down Home End choose, {close}"),
-        Dialog::Queue { .. } => format!("Up Down Home End choose, Left Right move it, x removes, {close}"),
+        Dialog::Queue { .. } => format!("Left Right move it, x removes, Up Down Home End choose, {close}"),
         Dialog::Report { .. } | Dialog::Help { .. } => format!("Up Down PgUp PgDn Home End scroll, {close}"),
         Dialog::Details { .. } => format!("Up Down Home End other trials, PgUp PgDn scroll, {close}"),
         Dialog::LogLine { .. } => format!("Up Down Home End other lines, PgUp PgDn scroll, {close}"),
