@@ -136,6 +136,9 @@ fn a_key_that_the_defaults_leave_out_may_be_given() {
     refuses("optimize.toml", "[sampler]\nleast_p_stand = 1.0\n", &["sampler.least_p_stand", "0.99"]);
     refuses("optimize.toml", "[fall_price]\nforward = -0.1\n", &["fall_price.forward", "0 to 10"]);
     refuses("optimize.toml", "[fall_price]\nlateral_left = 0.1\n", &["unknown key `fall_price.lateral_left`"]);
+    // Regression: a key without a similar one was refused without a remedy.
+    let remedy = "unknown key `zzzzzz`; remove it; `quadfrog config show` lists the keys of each file";
+    refuses("safety.toml", "zzzzzz = 1.0\n", &[remedy]);
     refuses("optimize.toml", "[sampler]\nstartup_trials = \"ten\"\n", &["sampler.startup_trials", "whole number"]);
 }
 

@@ -44,7 +44,10 @@ pub enum ConfigError {
     Write { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}: {message}")]
     Syntax { file: String, line: usize, message: String },
-    #[error("{file}:{line}: unknown key `{key}`{}", nearest.as_ref().map(|k| format!("; did you mean `{k}`?")).unwrap_or_default())]
+    #[error("{file}:{line}: unknown key `{key}`; {}", match nearest {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => "remove it; `quadfrog config show` lists the keys of each file".to_owned(),
+    })]
     UnknownKey { file: String, line: usize, key: String, nearest: Option<String> },
     #[error("{file}:{line}: `{key}` must be {expected}, not {found}")]
     Kind { file: String, line: usize, key: String, expected: String, found: String },

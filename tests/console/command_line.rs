@@ -299,7 +299,7 @@ fn a_wrong_number_is_refused_with_the_numbers_that_are_asked_for() {
         (&["export", "--trial", "x", "session.mcap"], "for '--trial <N>': give a whole number from 0 to 4294967295"),
         (&["prior", "--jobs", "1.5"], "for '--jobs <N>': give a whole number from 1 to 65535"),
         (&["evaluate", "--jobs", "-1"], "for '--jobs <N>': give a whole number from 1 to 65535"),
-        (&["bench", "loop", "--seconds", "-1"], "--seconds -1: give 0.1 to 86400"),
+        (&["bench", "loop", "--seconds", "-1"], "for '--seconds <S>': give 0.1 to 86400"),
         (&["study", "list"], "recordings: there is no such folder; give a folder that holds studies"),
         (&["--observe", "--resume", "recordings"], "'--observe' cannot be used with '--resume <DIR>'"),
         (&["--observe", "--approve", "auto"], "'--observe' cannot be used with '--approve <WHAT>'"),
@@ -376,8 +376,8 @@ fn manual_pages_and_schemas_are_written_whole_or_not_at_all() {
 #[test]
 fn bench_reports_why_a_program_failed_and_refuses_a_duration_that_measures_nothing() {
     let program = Program::new();
-    for seconds in ["0", "1e-9", "601", "nan"] {
-        assert_shows(&program.refused(&["bench", "--seconds", seconds]), &["--seconds ", "give 0.1 to 600"]);
+    for seconds in ["0", "1e-9", "601", "nan", "x"] {
+        assert_shows(&program.refused(&["bench", "--seconds", seconds]), &["for '--seconds <S>': give 0.1 to 600"]);
     }
     let failed = |script: &str| {
         program.write("mujoco.py", script);

@@ -264,6 +264,12 @@ fn a_robot_is_begun_from_its_urdf() {
     program.write("three.urdf", "<robot name=\"three\"><link name=\"trunk\"/></robot>");
     assert_shows(&program.refused(&["init", "three.urdf", "robots/three"]), &["three.urdf"]);
     assert!(!program.path("robots/three").exists(), "nothing is written for a URDF that is refused");
+    // Regression: a file of another kind was refused in the words of the XML parser alone.
+    program.write("notes.md", "# Notes\n");
+    assert_shows(
+        &program.refused(&["init", "notes.md", "robots/notes"]),
+        &["notes.md: ", "; give the URDF of a robot"],
+    );
     assert_shows(&program.refused(&["init", "none.urdf", "robots/none"]), &["none.urdf", "cannot be read"]);
 }
 

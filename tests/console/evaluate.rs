@@ -154,6 +154,17 @@ fn the_table_shows_means_with_spread_and_each_fall_with_cause_time_and_jumps() {
     assert!(falls.iter().all(|fall| fall.contains(" s, after ") && fall.ends_with(" jumps")), "{falls:?}");
 }
 
+/// Regression: a single run had standard deviations, 0.000, and the values of the point had no units.
+#[test]
+fn the_table_of_a_single_run_has_units_and_no_deviations() {
+    let text = String::from_utf8(evaluate(&["--point", "f0=1.5,Fx=40,Fz=200"]).stdout).unwrap();
+    for part in ["f0 1.5000 Hz, ", "Fx 40.0000 N, ", "Fz 200.0000 N"] {
+        assert!(text.contains(part), "{part} is not in: {text}");
+    }
+    let row = text.lines().find(|line| line.starts_with("on")).unwrap();
+    assert!(!row.contains('('), "{row}");
+}
+
 #[test]
 fn a_duration_counts_the_jumps_that_begin_within_it() {
     // One period lasts 0.5 / 1.25 + 0.5 / 0.8333 = 1.0 s: impulses begin at 0, 1 and 2 s.
@@ -174,6 +185,7 @@ fn wrong_input_is_refused_with_name_value_and_remedy() {
         (vec!["--point", "f0=1.3,f0=1.5"], vec!["f0 is given twice"]),
         (vec!["--point", "best"], vec!["--point best", "--config"]),
         (vec!["--point", "f0=1.3", "--vmc", "maybe"], vec!["maybe", "on,off"]),
+        (vec!["--point", "f0=1.3", "--friction", "a"], vec!["--friction", "give numbers, for example 0.4,0.6,1.0"]),
         (vec!["--point", "f0=1.3", "--friction", "99"], vec!["--friction 99", "0 to 10"]),
     ] {
         let output = evaluate(&arguments);

@@ -48,6 +48,14 @@ where
     }
 }
 
+/// Parses a number within a range; unlike clap's own parser it says what is asked for.
+pub fn number_within(range: RangeInclusive<f64>) -> impl TypedValueParser<Value = f64> {
+    move |text: &str| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("give {} to {}", range.start(), range.end()))
+    }
+}
+
 /// Parses a task.
 pub fn task() -> impl TypedValueParser<Value = Task> {
     one_of(Task::ALL.map(|task| {

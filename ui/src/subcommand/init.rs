@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::put_line;
 use clap::Args;
 use quadfrog::config::{Config, write_new_files};
-use quadfrog::robot::description::{Draft, read_text};
+use quadfrog::robot::description::{DescriptionError, Draft, read_text};
 use quadfrog::trial::{Backend, Task};
 
 use super::arguments::{load_config, printable_name};
@@ -32,7 +32,10 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let text =
         read_text(urdf).map_err(|error| refuse(&format!("cannot be read: {error}; give the URDF of a robot")))?;
     let name = name.clone().map_or_else(|| name_of(folder), Ok)?;
-    let draft = Draft::of_urdf(&name, urdf, &text).map_err(Failure::input)?;
+    let draft = Draft::of_urdf(&name, urdf, &text).map_err(|error| match error {
+        DescriptionError::Syntax { .. } => Failure::input(format!("{error}; give the URDF of a robot")),
+        error => Failure::input(error),
+    })?;
     let urdf_name = urdf.file_name().unwrap_or_default();
     let files = [(Path::new("robot.toml"), &draft.toml), (Path::new(urdf_name), &text)];
     for path in write_new_files(folder, &files)? {

@@ -26,7 +26,7 @@ use quadfrog::sim::emulator::Emulator;
 use quadfrog::telemetry::{Command, Event, Mode, Permit, Tick};
 use quadfrog::trial::{Backend, Task};
 
-use super::super::arguments::whole_number;
+use super::super::arguments::{number_within, whole_number};
 use super::machine::{self, Durations, PERIOD, durations};
 use crate::subcommand::failure::Failure;
 
@@ -40,7 +40,7 @@ const STAND_UP_LIMIT_TICKS: u64 = 30_000;
 #[derive(Debug, Args)]
 pub struct LoopArguments {
     /// Duration of the measurement, s
-    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = number_within(0.1..=86_400.0))]
     seconds: f64,
     /// SCHED_FIFO priority, of cyclictest too; 0 is an ordinary thread
     #[arg(long, value_name = "P", default_value_t = 80, value_parser = whole_number(0_u8..=99))]
@@ -116,9 +116,6 @@ impl LoopMeasurement {
 }
 
 pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
-    if !(arguments.seconds >= 0.1 && arguments.seconds <= 86_400.0) {
-        return Err(Failure::input(format!("--seconds {}: give 0.1 to 86400", arguments.seconds)));
-    }
     machine::print_header("");
     // All measurements run on the same core: the first isolated one, if any.
     let core = isolated_cores().first().copied();

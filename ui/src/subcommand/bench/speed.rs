@@ -11,6 +11,7 @@ use clap::Args;
 use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
 
 use super::machine;
+use crate::subcommand::arguments::number_within;
 use crate::subcommand::failure::Failure;
 use quadfrog::session::parallel::cores;
 
@@ -20,7 +21,7 @@ const SECONDS: RangeInclusive<f64> = 0.1..=600.0;
 #[derive(Debug, Args)]
 pub struct SpeedArguments {
     /// Duration of each measurement, s
-    #[arg(long, value_name = "S", default_value_t = 3.0)]
+    #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = number_within(SECONDS))]
     seconds: f64,
     /// Python script whose `bench SECONDS` prints MuJoCo's {"mj_steps_per_s_standing": ...} on the same model
     #[arg(long, value_name = "FILE")]
@@ -31,10 +32,6 @@ pub struct SpeedArguments {
 }
 
 pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
-    if !SECONDS.contains(&arguments.seconds) {
-        let (given, least, most) = (arguments.seconds, *SECONDS.start(), *SECONDS.end());
-        return Err(Failure::input(format!("--seconds {given}: give {least} to {most}")));
-    }
     if let Some(script) = arguments.mujoco.as_ref().filter(|script| !script.is_file()) {
         return Err(Failure::input(format!("--mujoco {}: there is no such file", script.display())));
     }

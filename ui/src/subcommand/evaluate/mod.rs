@@ -50,7 +50,7 @@ pub struct EvaluateArguments {
     #[arg(long, value_name = "WHICH", value_delimiter = ',', value_parser = vmc)]
     vmc: Vec<bool>,
     /// Variants of the friction of ground and blocks, as 0.4,0.6,1.0 [default: that of simulator.toml]
-    #[arg(long, value_name = "MU", value_delimiter = ',')]
+    #[arg(long, value_name = "MU", value_delimiter = ',', value_parser = friction)]
     friction: Vec<f64>,
     /// Length of the run, s: the last impulse begins before it [default: the number of jumps of control.toml]
     #[arg(long, value_name = "S", value_parser = duration)]
@@ -78,6 +78,11 @@ fn vmc(text: &str) -> Result<bool, String> {
         "off" => Ok(false),
         _ => Err("give on, off or on,off".to_owned()),
     }
+}
+
+/// Parses a coefficient of friction; the simulator checks its range.
+fn friction(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "give numbers, for example 0.4,0.6,1.0".to_owned())
 }
 
 fn duration(text: &str) -> Result<f64, String> {

@@ -2,14 +2,15 @@
 
 use quadfrog::session::evaluation::EvaluatedRun;
 use quadfrog::telemetry::TrialSpec;
-use quadfrog::trial::{ParameterValues, counted};
+use quadfrog::trial::{ParameterValues, counted, parameter_unit};
 
 use super::variant::{Variant, on_off};
 
 /// Returns the table as text. Jumps and tilt are those of all runs, the other columns those of the runs that stood.
 pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Variant, EvaluatedRun)]) -> String {
     let TrialSpec { task, jumps, rate, .. } = *spec;
-    let values: Vec<String> = point.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+    let values: Vec<String> =
+        point.iter().map(|(name, value)| format!("{name} {value:.4} {}", parameter_unit(name))).collect();
     let mut text =
         format!("{} of the {robot}, {}, {}\n", task.name(), values.join(", "), counted(jumps as usize, "jump"));
     let with_friction = runs.iter().any(|(variant, _)| variant.friction.is_some());
@@ -50,18 +51,22 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
             text += &format!("     seed {seed}: {cause}{time}, after {}\n", counted(*jumps as usize, "jump"));
         }
     }
-    text += "Means with standard deviations; value, roll and pitch of the runs that stood. Tilt: of the trunk when an impulse starts.\n";
+    text += "Means, of several runs with standard deviations; value, roll and pitch of the runs that stood.\n";
+    text += "Tilt: of the trunk when an impulse starts.\n";
     text
 }
 
-/// Returns "0.251 (0.012)"; "-" without runs.
+/// Returns "0.251 (0.012)", of a single run "0.251"; "-" without runs.
 fn mean_and_spread(runs: &[&EvaluatedRun], digits: usize, value: fn(&EvaluatedRun) -> f64) -> String {
     if runs.is_empty() {
         return "-".to_owned();
     }
     let count = runs.len() as f64;
     let mean = runs.iter().map(|run| value(run)).sum::<f64>() / count;
+    if runs.len() == 1 {
+        return format!("{mean:.digits$}");
+    }
     let squares = runs.iter().map(|run| (value(run) - mean).powi(2)).sum::<f64>();
-    let spread = (squares / (count - 1.0).max(1.0)).sqrt();
+    let spread = (squares / (count - 1.0)).sqrt();
     format!("{mean:.digits$} ({spread:.digits$})")
 }
