@@ -7,6 +7,8 @@ use crate::telemetry::Mode;
 pub enum Trigger {
     /// The first state arrived.
     Connected,
+    /// The operator asks for control of a robot that has not answered: it is called.
+    Contact,
     /// The operator takes control.
     TakeControl,
     /// An observer has acknowledged its STOP: the robot is only observed again.
@@ -55,6 +57,8 @@ pub fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
         (_, Trigger::Fault) => Some(Fault),
         (mode, Trigger::Fell) if mode.energised() => Some(Damped),
         (Offline, Trigger::Connected) => Some(Observe),
+        // Called, the robot answers; the first state may have arrived by itself meanwhile.
+        (Offline | Observe, Trigger::Contact) => Some(mode),
         (Observe, Trigger::TakeControl) => Some(Disarmed),
         (Disarmed, Trigger::Release) => Some(Observe),
         (Disarmed, Trigger::Arm) => Some(StandUp),

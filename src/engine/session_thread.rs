@@ -11,7 +11,6 @@ use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
 use crate::recording::record::LogLevel;
 use crate::session::operator_request::StampedRequest;
 use crate::session::supervisor::Supervisor;
-use crate::telemetry::Mode;
 
 /// Longest time between two polls of the control thread's events.
 const SESSION_PERIOD: Duration = Duration::from_millis(5);
@@ -64,10 +63,7 @@ pub fn run(
                 format!("systemd refused the sleep lock or ended it: the computer may suspend; {ALLOW_INHIBITOR}");
             supervisor.log(LogLevel::Warning, message, clock.now_ns());
         }
-        // A real robot is taken control of with a key: another program may command it.
-        if supervisor.mode() == Mode::Observe && (!hardware || supervisor.control_wanted()) {
-            supervisor.take_control();
-        }
+        supervisor.take_wanted_control(hardware);
         match requests.recv_timeout(SESSION_PERIOD) {
             Ok(request) => supervisor.handle_request(&request, clock.now_ns()),
             Err(RecvTimeoutError::Timeout) => {}

@@ -27,6 +27,8 @@ pub const GRAVITY: f64 = 9.81;
 pub const CONTROL_PERIOD_S: f64 = 0.001;
 /// Step of the damping of a motor in a Go1's datagram, N m s/rad (`docs/go1-wire.md`).
 pub const MOTOR_DAMPING_STEP: f64 = 1.0 / 16.0;
+/// Longest time for which a request for control of a silent robot holds, s: nothing is sent to a robot that is switched on later.
+pub const CONTACT_S: u32 = 10;
 /// Number of legs.
 pub const LEGS: usize = 4;
 /// Number of actuated joints; index `3 * leg + joint`.
@@ -327,7 +329,8 @@ pub trait Robot: Send {
         None
     }
 
-    /// Begins to call a robot that sends nothing until it is commanded. A robot that answers by itself ignores it.
+    /// Begins to call a robot that sends nothing until it is commanded, for at most [`CONTACT_S`] and until the first command. A robot
+    /// that answers by itself ignores it.
     fn begin_contact(&mut self) {}
 
     /// Warms the caches for `read` and `write`, under the same real-time rules; see [`crate::control::control_loop`].

@@ -131,7 +131,7 @@ fn take_control(session: &mut Session) {
 fn a_console_sends_nothing_to_a_robot_before_a_key() {
     let (folder, robot) = (tempfile::tempdir().unwrap(), RecordingRobot::start());
     let mut session = console(folder.path(), &robot, &[]);
-    session.wait_for(&["OFFLINE", "The robot is silent, nothing was sent to it. L takes control."]);
+    session.wait_for(&["OFFLINE", "The robot is silent, nothing is sent to it. L takes control."]);
     std::thread::sleep(Duration::from_secs(3));
     session.send("L");
     session.wait_for(&["Take control?", "has sent nothing since the start"]);

@@ -231,13 +231,13 @@ fn a_silent_robot_whose_control_is_taken_is_sent_commands() {
     let mut console = on_hardware(Console::new());
     console.mode(Mode::Offline);
     console.wait(1000);
-    assert_eq!(console.next_step(), "The robot is silent, nothing was sent to it. L takes control.");
+    assert_eq!(console.next_step(), "The robot is silent, nothing is sent to it. L takes control.");
     assert_eq!(console.press(&["Ctrl-Z"]), [Effect::Suspend], "nothing was sent");
     assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
     console.answer("take control", false, "the robot is DISARMED");
-    assert_shows(&console.next_step(), &["nothing was sent to it"]);
+    assert_shows(&console.next_step(), &["nothing is sent to it"]);
     console.answer("take control", true, "braking commands are sent until the robot answers, then damping");
-    assert_eq!(console.next_step(), "Braking commands are sent until the robot answers; it is then damped.");
+    assert_eq!(console.next_step(), "Braking commands are sent for at most 10 s; a robot that answers is damped.");
     assert_eq!(console.press(&["Ctrl-Z"]), []);
     assert_shows(console.said(), &["a suspended program sends the robot nothing"]);
     console.mode(Mode::Observe);
@@ -246,7 +246,22 @@ fn a_silent_robot_whose_control_is_taken_is_sent_commands() {
     let go2 = SessionInfo { backend: Some(Backend::Hardware), robot: "go2".into(), ..session() };
     console.model.session.info = go2;
     console.mode(Mode::Offline);
-    assert_eq!(console.next_step(), "Braking commands may be sent until the robot answers; it is then damped.");
+    assert_eq!(console.next_step(), "Braking commands may be sent for at most 10 s; a robot that answers is damped.");
+}
+
+/// Regression: after a request for control that no robot answered, the last line spoke of braking commands without end.
+#[test]
+fn a_robot_that_was_called_in_vain_is_shown_as_sent_nothing() {
+    let mut console = on_hardware(Console::new());
+    console.mode(Mode::Offline);
+    console.wait(1000);
+    assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
+    console.answer("take control", true, "a Go1 is sent braking commands");
+    console.answer("take control", false, "no state of the robot for 10 s");
+    assert_eq!(console.next_step(), "The robot is silent, nothing is sent to it. L takes control.");
+    console.mode(Mode::Observe);
+    assert_eq!(console.next_step(), "The robot sends states, nothing is sent to it. L takes control.");
+    assert_eq!(console.requests(&["L", "y"]), [OperatorRequest::TakeControl]);
 }
 
 /// Regression: of a robot that sent nothing it was shown that it followed an observer's STOP, from torques of zero.

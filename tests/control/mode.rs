@@ -12,8 +12,8 @@ fn every_pair_of_mode_and_trigger_is_in_the_table() {
     use Trigger as T;
     type Row = (Mode, bool, Option<Mode>, &'static [(Trigger, Mode)]);
     let table: [Row; 12] = [
-        (Offline, false, None, &[(T::Connected, Observe)]),
-        (Observe, false, None, &[(T::TakeControl, Disarmed)]),
+        (Offline, false, None, &[(T::Contact, Offline), (T::Connected, Observe)]),
+        (Observe, false, None, &[(T::Contact, Observe), (T::TakeControl, Disarmed)]),
         (Disarmed, false, Some(Fault), &[(T::Release, Observe), (T::Arm, StandUp)]),
         (StandUp, true, Some(Fault), &[(T::PoseReached, Ready), (T::SitDown, SitDown)]),
         (Ready, true, Some(Fault), &[(T::Approve, Countdown), (T::SitDown, SitDown)]),

@@ -532,6 +532,42 @@ fn control_is_taken_only_once_a_screen_was_heard() {
     assert_eq!(session.body.mode(), Mode::Disarmed);
 }
 
+/// Regression: a request for control held without end: a robot that was switched on a minute later was commanded without a key.
+#[test]
+fn a_request_for_control_of_a_silent_robot_holds_for_ten_seconds() {
+    let mut session = Session::begin(Backend::Hardware, None, false);
+    let run = |session: &mut Session, ms: u32| {
+        for _ in 0..ms {
+            session.ticks(1);
+            session.supervisor.take_wanted_control(true);
+        }
+    };
+    session.robot.silent_ms = 1;
+    run(&mut session, 1000);
+    assert!(session.request(OperatorRequest::TakeControl).accepted);
+    session.records.clear();
+    let answers = |session: &Session| -> Vec<RequestRecord> {
+        let answer = |record: &Record| match record {
+            Record::Request(answer) => Some(answer.clone()),
+            _ => None,
+        };
+        session.records.iter().filter_map(answer).collect()
+    };
+    run(&mut session, 9900);
+    assert_eq!(answers(&session), []);
+    run(&mut session, 200);
+    let [expired] = &answers(&session)[..] else { panic!("{:?}", session.records) };
+    assert_eq!((expired.accepted, expired.request.as_str()), (false, "take control"));
+    assert_eq!(expired.answer, "no state of the robot for 10 s: nothing is sent to the robot; ask for control again");
+    session.robot.silent_ms = 0;
+    run(&mut session, 1000);
+    assert_eq!((session.body.mode(), session.robot.writes), (Mode::Observe, 0));
+    assert!(session.request(OperatorRequest::TakeControl).accepted);
+    run(&mut session, 20_000);
+    assert_eq!(session.body.mode(), Mode::Disarmed);
+    assert!(answers(&session).iter().skip(1).all(|answer| answer.accepted), "{:?}", answers(&session));
+}
+
 /// On the console, too, the operator reads which number ended the trial.
 #[test]
 fn a_limit_that_ends_a_trial_is_logged_with_its_key() {

@@ -12,6 +12,7 @@ impl Cycle {
     /// Carries out a command, or reports its refusal as an event.
     pub(super) fn handle_command<R: Robot + ?Sized>(&mut self, command: &Command, inputs: &TickInputs, robot: &mut R) {
         let trigger = match command {
+            Command::Contact => Trigger::Contact,
             Command::TakeControl => Trigger::TakeControl,
             Command::Release => Trigger::Release,
             Command::Arm(_) => Trigger::Arm,
@@ -20,11 +21,6 @@ impl Cycle {
             Command::Cancel => Trigger::Cancel,
             Command::EndReview => Trigger::EndReview,
             Command::Acknowledge { .. } => Trigger::Acknowledge,
-            // No trigger: the mode changes when the robot answers.
-            Command::Contact => {
-                robot.begin_contact();
-                return;
-            }
             // No trigger: from the next tick on the failsafes land an energised robot.
             Command::Leave => {
                 self.session_left = true;
@@ -50,6 +46,7 @@ impl Cycle {
             return;
         }
         match command {
+            Command::Contact => robot.begin_contact(),
             Command::RunTrial(spec, _) => {
                 // A robot that was placed is in its stance; another one must be ready where it stands.
                 if !self.place_for_trial(robot, spec)

@@ -13,7 +13,7 @@ use super::description::{DescriptionError, RobotFiles};
 use super::link_settings::LinkSettings;
 use super::servo_grace::ServoGrace;
 use super::state_counter::StateClock;
-use super::{JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
+use super::{CONTACT_S, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use link::{Link, LinkError, LinkOptions};
 use packet::{CommandError, CrcForm, LowCmd};
 
@@ -71,16 +71,14 @@ impl Go1Network {
 /// A Go1 behind its link.
 ///
 /// Assumed: the robot sends its states to the source address of the commands. From `begin_contact` until the first state
-/// arrives, a hello command, in which every motor brakes without a target, is sent a few times per second; afterwards
-/// only the controller's commands.
+/// arrives, at most for [`CONTACT_S`], a hello command, in which every motor brakes without a target, is sent a few times
+/// per second. The controller's first command ends them too: its damping is never mixed with braking.
 #[derive(Debug)]
 pub struct Go1 {
     link: Link,
     network: Go1Network,
-    /// Whether hello commands are sent.
-    sends_hello: bool,
-    /// Time since the last hello command, ms.
-    since_hello_ms: u32,
+    /// Time for which the robot has been called, ms; none if it is not called.
+    called_ms: Option<u32>,
     servo: ServoGrace,
     /// The last sent command that damps every joint.
     damping: Option<LowCmd>,
@@ -100,8 +98,7 @@ impl Go1 {
         Ok(Go1 {
             link,
             network: *network,
-            sends_hello: !listen_only,
-            since_hello_ms: network.hello_ms,
+            called_ms: (!listen_only).then_some(0),
             servo: ServoGrace::new(network.servo_grace_ms),
             damping: None,
         })
@@ -131,11 +128,13 @@ impl Go1 {
         convert::low_cmd(&JointCommand::damping(kd), self.network.crc)
     }
 
-    /// Sends a hello command to a robot that has never answered.
-    fn hello(&mut self) {
-        self.since_hello_ms += 1;
-        if self.sends_hello && !self.link.has_received() && self.since_hello_ms >= self.network.hello_ms {
-            self.since_hello_ms = 0;
+    /// Calls a robot that has never answered: sends a hello command at once, then one per period.
+    fn call(&mut self) {
+        let Some(called_ms) = self.called_ms.filter(|ms| *ms < 1000 * CONTACT_S && !self.link.has_received()) else {
+            return;
+        };
+        self.called_ms = Some(called_ms + 1);
+        if called_ms.is_multiple_of(self.network.hello_ms) {
             // An error is counted in the link's statistics.
             let _ = self.link.send(&LowCmd::braking(self.network.crc));
         }
@@ -148,7 +147,7 @@ impl Robot for Go1 {
         self.servo.advance();
         let Some(state) = self.link.receive() else {
             let age_ms = self.link.status().state_age_ms;
-            self.hello();
+            self.call();
             return Err(RobotError::NoNewState { age_ms });
         };
         let mut state = convert::robot_state(state, self.network.foot_force_n);
@@ -158,8 +157,9 @@ impl Robot for Go1 {
 
     /// Sends one command. If it does not fit a datagram, the error is `EINVAL` and the last damping command is sent in
     /// its place. Every robot is damped before it is armed; one that was never damped was never commanded, and nothing
-    /// is sent to it.
+    /// is sent to it. No hello command follows.
     fn write(&mut self, command: &JointCommand) -> Result<(), RobotError> {
+        self.called_ms = None;
         let encoded = convert::low_cmd(command, self.network.crc);
         if *command == JointCommand::damping(command.motor[0].kd_joint) {
             self.damping = encoded.as_ref().ok().copied().or(self.damping);
@@ -182,7 +182,7 @@ impl Robot for Go1 {
     }
 
     fn begin_contact(&mut self) {
-        self.sends_hello = true;
+        self.called_ms = Some(0);
     }
 
     fn warm_up(&mut self) {

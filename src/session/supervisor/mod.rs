@@ -121,8 +121,8 @@ pub struct Supervisor {
     guard_objection: Option<&'static str>,
     observe: bool,
     control_requested: bool,
-    /// The operator has asked for control of a real robot.
-    control_wanted: bool,
+    /// The operator's request for control of a real robot; none once control is taken, and after its time.
+    control_wanted: Option<StampedRequest>,
     /// Heartbeats of the console when control was refused last: it is requested again after the next.
     heartbeats: u64,
     counters_ns: u64,
@@ -178,7 +178,7 @@ impl Supervisor {
             guard_objection: None,
             observe,
             control_requested: false,
-            control_wanted: false,
+            control_wanted: None,
             heartbeats: 0,
             counters_ns: 0,
             checklist,
@@ -269,6 +269,7 @@ impl Supervisor {
             }
         }
         self.release();
+        self.expire_control_request(time_ns);
         self.measure(time_ns);
         let RecorderStatus { error, warning, .. } = self.recorder.get();
         if warning != self.recorder_warning {
@@ -348,9 +349,12 @@ impl Supervisor {
         }
     }
 
-    /// Whether the operator has asked for control of the robot.
-    pub fn control_wanted(&self) -> bool {
-        self.control_wanted
+    /// Takes control of a robot that sends states: of a real one, which another program may command, only while a request of the operator
+    /// holds.
+    pub fn take_wanted_control(&mut self, hardware: bool) {
+        if self.mode == Mode::Observe && (!hardware || self.control_wanted.is_some()) {
+            self.take_control();
+        }
     }
 
     /// STOP by the session at its end: the last reported mode may be old, and a command that energises the robot may still be
@@ -386,6 +390,9 @@ impl Supervisor {
                 self.cause = cause;
                 self.mode_changes += 1;
                 self.releasing = false;
+                if to.commanded() {
+                    self.control_wanted = None;
+                }
                 self.checklist.mode_changed(from, to, &cause);
                 self.record_checklist();
                 if !(self.sitting_for_review && to == Mode::SitDown) {
@@ -417,6 +424,7 @@ impl Supervisor {
                         self.unmeasured.push_back(TrialTicks { trial: spec.trial, ticks: Vec::new() });
                     }
                     Command::Arm(_) => self.unattended.arming_refused(time_ns),
+                    Command::Contact => self.control_wanted = None,
                     Command::TakeControl => {
                         self.control_requested = false;
                         self.heartbeats = self.control.heartbeat.count();

@@ -4,6 +4,7 @@ use super::unfinished::{ApprovalState, Asker, JobPurpose};
 use super::{OTHER_FILE, Supervisor, study_requests};
 use crate::control::mode::{self, Trigger};
 use crate::realtime::channel::Lowering;
+use crate::robot::CONTACT_S;
 use crate::session::arming_checklist::refusals;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
 use crate::session::storage::JobOutput;
@@ -62,16 +63,29 @@ impl Supervisor {
             OperatorRequest::TakeControl => match self.mode {
                 Mode::Offline => {
                     self.command(Command::Contact)?;
-                    self.control_wanted = true;
-                    Ok("until states arrive a Go1 is sent braking commands, a Go2 nothing; then damping".to_owned())
+                    self.control_wanted = Some(stamped.clone());
+                    Ok(format!(
+                        "until states arrive, for at most {CONTACT_S} s, a Go1 is sent braking commands, a Go2 nothing; then damping"
+                    ))
                 }
                 Mode::Observe => {
-                    self.control_wanted = true;
+                    self.control_wanted = Some(stamped.clone());
                     Ok("damping is sent from now on".to_owned())
                 }
                 mode => Err(format!("the robot is {}: this session commands it already", mode.name())),
             },
             _ => Err("this is no request to the robot".to_owned()),
+        }
+    }
+
+    /// Answers a request for control that has not led to it within [`CONTACT_S`]: a robot that is switched on later is sent nothing.
+    pub(super) fn expire_control_request(&mut self, time_ns: u64) {
+        let expires_ns =
+            |request: &StampedRequest| request.time_ns.saturating_add(u64::from(CONTACT_S) * 1_000_000_000);
+        if let Some(request) = self.control_wanted.take_if(|request| time_ns >= expires_ns(request)) {
+            let missing = if self.mode == Mode::Offline { "state of the robot" } else { "heartbeat of the console" };
+            let answer = format!("no {missing} for {CONTACT_S} s: nothing is sent to the robot; ask for control again");
+            self.respond(&request, Asker::Operator, Err(answer), time_ns);
         }
     }
 

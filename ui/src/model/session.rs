@@ -35,7 +35,7 @@ pub struct SessionModel {
     pub log: SessionLog,
     /// The trial that was judged last, or a repeat of it: the one whose verdict the session takes back while it can.
     pub last_judged: Option<u32>,
-    /// Whether the session has taken control of a real robot: from then on it may send commands, also before the robot answers.
+    /// Whether the session has taken control of a real robot or calls a silent one: it may send commands.
     pub control_taken: bool,
     /// Cause of the newest DAMPED or FAULT.
     pub stopped_because: String,

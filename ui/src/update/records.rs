@@ -343,7 +343,9 @@ fn answer(model: &mut Model, time_ns: u64, command: RequestRecord) {
     let (level, outcome) = if command.accepted { (LogLevel::Info, "") } else { (LogLevel::Warning, "refused: ") };
     if command.accepted {
         model.session.sat_down_because.clear();
-        model.session.control_taken |= command.request == OperatorRequest::TakeControl.to_string();
+    }
+    if command.request == OperatorRequest::TakeControl.to_string() {
+        model.session.control_taken = command.accepted;
     }
     let text = match command.answer.as_str() {
         "" => command.request.clone(),

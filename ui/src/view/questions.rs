@@ -1,5 +1,6 @@
 //! The texts of the questions: each says what follows, and Cancel is the default and comes first.
 
+use quadfrog::robot::CONTACT_S;
 use quadfrog::session::objective;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::{ExperimentStage, ProposalSource, ProposedParameter, TrialRecord, Verdict, counted, six_digits};
@@ -37,20 +38,19 @@ pub fn take_control(model: &Model) -> Vec<Line<'static>> {
     let foreign_commands = model.snapshot.counters.link.map_or(0, |link| link.foreign_commands);
     let heard = match model.mode() {
         Mode::Offline => {
-            "The robot has sent nothing since the start. A Go1 answers only after a command: it is sent braking commands \
-             without a target. A Go2 is sent nothing. Damping is sent once states arrive."
-                .to_owned()
+            format!(
+                "The robot has sent nothing since the start. A Go1 answers only after a command: it is sent braking commands \
+                 without a target, for at most {CONTACT_S} s. A Go2 is sent nothing. Damping is sent once states arrive."
+            )
         }
         _ if foreign_commands > 0 => format!(
             "Another program commands the robot: {} of it until now. End it first: both would command the robot, and \
              arming ends in a fault. Damping is sent from now on.",
             counted(foreign_commands as usize, "command")
         ),
-        _ => {
-            "States arrive although this console has sent nothing: another program may command the robot. Damping is \
+        _ => "States arrive although this console sends nothing: another program may command the robot. Damping is \
              sent from now on."
-                .to_owned()
-        }
+            .to_owned(),
     };
     vec![
         Line::from(heard),

@@ -3,7 +3,7 @@
 mod dialog;
 
 use quadfrog::engine::WHO_WATCHES;
-use quadfrog::robot::joint_name;
+use quadfrog::robot::{CONTACT_S, joint_name};
 use quadfrog::session::prior::PriorProgress;
 use quadfrog::telemetry::{Mode, TransitionCause};
 use quadfrog::trial::{ExperimentStage, Verdict};
@@ -129,12 +129,12 @@ fn live(model: &Model) -> NextStep {
         mode @ (Mode::Offline | Mode::Observe) if session.info.is_hardware() => {
             let take = key(Action::TakeControl);
             let lead = match (mode, session.control_taken) {
-                (Mode::Offline, false) => format!("The robot is silent, nothing was sent to it. {take} takes control."),
-                (_, false) => format!("The robot sends states, nothing was sent to it. {take} takes control."),
+                (Mode::Offline, false) => format!("The robot is silent, nothing is sent to it. {take} takes control."),
+                (_, false) => format!("The robot sends states, nothing is sent to it. {take} takes control."),
                 (Mode::Offline, true) => {
                     // A Go2 is sent nothing before its first state.
                     let sent = if session.info.robot == "go1" { "are" } else { "may be" };
-                    format!("Braking commands {sent} sent until the robot answers; it is then damped.")
+                    format!("Braking commands {sent} sent for at most {CONTACT_S} s; a robot that answers is damped.")
                 }
                 (_, true) => "The robot sends states; it is damped from now on.".to_owned(),
             };
