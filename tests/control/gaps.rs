@@ -3,6 +3,7 @@
 use crate::cores::on_all_cores;
 use crate::emulated::{EmulatedBench, emulated_on, hardware_like};
 use nalgebra::{UnitQuaternion, Vector3};
+use quadfrog::control::cycle::Cycle;
 use quadfrog::robot::{LEGS, RobotState};
 use quadfrog::telemetry::{Command, Fault, Mode, SensorCheck, TrialSpec};
 use quadfrog::trial::{Backend, JumpParameters, Task};
@@ -64,6 +65,30 @@ fn a_step_behind_a_gap_in_the_states_is_damped() {
         }
     }
     assert!(missed.is_empty(), "{missed:#?}");
+}
+
+/// Regression: with a limit of 100 ms for the state's age a gap of 60 states hid 0.9 rad, one of 100 states 1.7 rad.
+#[test]
+fn a_lax_limit_of_the_states_age_allows_no_larger_step() {
+    let steps: [(&str, Step); 3] = [
+        ("no step", |_| {}),
+        ("calf +0.8 rad", |state| state.joint_position_rad[2] += 0.8),
+        ("yaw +0.5 rad", |state| turned(state, Vector3::z_axis(), 0.5)),
+    ];
+    for (name, step) in steps {
+        for lost in [30, 60, 95] {
+            let mut bench = emulated_on(Backend::Hardware, 1, hardware_like);
+            bench.settings.failsafe.state_age_ms = 100;
+            bench.cycle = Cycle::new(&bench.settings);
+            let mut bench = bench.reach(Mode::Ready);
+            bench.ticks(300);
+            let reaction = bench.reaction(lost, step);
+            match name {
+                "no step" => assert_eq!((reaction, bench.cycle.mode()), (None, Mode::Ready), "{lost} lost states"),
+                _ => assert!(matches!(reaction, Some((..=2, _))), "{name} after {lost} lost states: {reaction:?}"),
+            }
+        }
+    }
 }
 
 /// Regression: in flight, a yaw that had turned by 2 rad behind three lost states was measured: J 3.01 rad in place of 1.01 rad, settled.

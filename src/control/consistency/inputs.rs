@@ -9,6 +9,8 @@ use crate::telemetry::{Estimate, Mode};
 const SHORT_STEP_S: f64 = 0.0035;
 /// Time between two states beyond which a landing may hide more than half the change of the rates, s.
 const HIDING_STEP_S: f64 = 0.015;
+/// Time between two states up to which that was measured, s: 20 lost states (`tests/control/gaps.rs`). A longer gap hides no more.
+const MEASURED_STEP_S: f64 = 0.021;
 
 /// Data of one tick.
 #[derive(Debug, Clone, Copy)]
@@ -50,11 +52,11 @@ impl StateStep {
 
     /// Returns the change that the mean of both rates may miss, rad, where the rate changed by `change_rad_s`: half of that over the whole
     /// gap, as of a rate that changed at its begin or at its end. In a longer gap a rate may also rise and fall again: `hidden_rad_s` for
-    /// the time beyond.
+    /// the time beyond, as far as that was measured.
     pub fn allowance_rad(&self, change_rad_s: f64, hidden_rad_s: f64) -> f64 {
         if self.dt_s < SHORT_STEP_S {
             return 0.0;
         }
-        0.5 * change_rad_s * self.dt_s + hidden_rad_s * (self.dt_s - HIDING_STEP_S).max(0.0)
+        0.5 * change_rad_s * self.dt_s + hidden_rad_s * (self.dt_s.min(MEASURED_STEP_S) - HIDING_STEP_S).max(0.0)
     }
 }
