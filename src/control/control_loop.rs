@@ -72,6 +72,7 @@ impl ControlLoop {
         let inputs = TickInputs {
             time_ns,
             lateness_ns: start.lateness_ns,
+            unslewed_ns: clock.unslewed_ns(),
             stop: end.stop.is_set(),
             operator_silent_ms: self.heartbeat.silent_ms(end.heartbeat.count(), time_ns),
             command,
@@ -121,7 +122,7 @@ impl ControlLoop {
     pub fn warm_up<C: Clock>(&mut self, clock: &C, robot: &mut dyn Robot) {
         robot.warm_up();
         let last = self.cycle.last();
-        let inputs = TickInputs { time_ns: last.time_ns, ..TickInputs::default() };
+        let inputs = TickInputs { time_ns: last.time_ns, unslewed_ns: clock.unslewed_ns(), ..TickInputs::default() };
         let mut state = last.state;
         state.robot_time_ms = state.robot_time_ms.wrapping_add(1);
         let mut repeated = LastState { state, link: robot.link() };

@@ -33,9 +33,9 @@ pub struct LinkQuality {
 }
 
 impl LinkQuality {
-    /// Records one tick; to be called once per tick, after reading the robot. `now_ns` is the local time at which the tick began,
-    /// `drift_ppm` the clocks' largest drift, parts per million. When the robot's clock restarts or stands still, the delay is measured
-    /// anew.
+    /// Records one tick; to be called once per tick, after reading the robot. `now_ns` is the local time at which the tick began, of a
+    /// clock that is not slewed, `drift_ppm` the clocks' largest drift, parts per million. When the robot's clock restarts or stands still,
+    /// the delay is measured anew.
     pub fn update(
         &mut self,
         now_ns: u64,

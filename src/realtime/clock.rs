@@ -9,6 +9,11 @@ pub trait Clock {
     /// Time since the clock was created, ns.
     fn now_ns(&self) -> u64;
 
+    /// Time on a clock that no time service speeds up or slows down, ns since any instant; none where there is no such clock.
+    fn unslewed_ns(&self) -> Option<u64> {
+        None
+    }
+
     /// Lower and upper bound of the time for which the computer has been suspended since it was started, ns; none where it
     /// is not known.
     fn suspended_ns(&self) -> Option<[u64; 2]> {
@@ -32,6 +37,11 @@ impl MonotonicClock {
 impl Clock for MonotonicClock {
     fn now_ns(&self) -> u64 {
         self.start.elapsed().as_nanos() as u64
+    }
+
+    /// CLOCK_MONOTONIC_RAW: a time service slews CLOCK_MONOTONIC by 500 ppm and more (clock_gettime(2), adjtimex(2)).
+    fn unslewed_ns(&self) -> Option<u64> {
+        read_ns(ClockId::CLOCK_MONOTONIC_RAW)
     }
 
     fn suspended_ns(&self) -> Option<[u64; 2]> {

@@ -29,5 +29,6 @@ mod mode;
 mod readiness;
 mod rotation;
 mod series;
+mod slewed_clock;
 mod standing;
 mod warm_up;

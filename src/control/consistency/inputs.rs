@@ -27,7 +27,7 @@ pub struct ConsistencyInputs<'a> {
     pub accel_body: Vector3<f64>,
     /// Estimate from the state.
     pub estimate: &'a Estimate,
-    /// Time of this computer, ns.
+    /// Time of this computer, ns; of a clock that is not slewed, where there is one.
     pub now_ns: u64,
     /// The link; none for a machine without one.
     pub link: Option<LinkStatus>,

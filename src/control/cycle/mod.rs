@@ -35,6 +35,8 @@ pub struct TickInputs {
     pub time_ns: u64,
     /// Delay of the real start, ns.
     pub lateness_ns: u64,
+    /// Time of the tick by [`Clock::unslewed_ns`].
+    pub unslewed_ns: Option<u64>,
     /// The STOP latch.
     pub stop: bool,
     /// Time since the last heartbeat of the operator's console, ms.
@@ -47,6 +49,13 @@ pub struct TickInputs {
     pub suspended_ms: u32,
     /// Time for which the guard has not answered, ms; `u32::MAX` when it is gone, zero without a guard.
     pub guard_silent_ms: u32,
+}
+
+impl TickInputs {
+    /// Time with which the robot's clock is compared, ns: of a clock that is not slewed, else the real start of the tick.
+    fn compared_ns(&self) -> u64 {
+        self.unslewed_ns.unwrap_or(self.time_ns.saturating_add(self.lateness_ns))
+    }
 }
 
 /// Events of one tick.
@@ -296,7 +305,7 @@ impl Cycle {
 
     /// Measures the quality of the link with the state of this tick.
     fn measure_link<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, robot: &R) {
-        let now_ns = inputs.time_ns + inputs.lateness_ns;
+        let now_ns = inputs.compared_ns();
         let (robot_time_ms, drift_ppm) = (self.tick.state.robot_time_ms, self.settings.failsafe.clock_drift_ppm);
         self.link_quality.update(now_ns, robot_time_ms, self.state_age_ms, robot.link(), drift_ppm);
     }
@@ -316,7 +325,7 @@ impl Cycle {
             restarted,
             accel_body: self.estimator.accel_body(),
             estimate: &self.tick.estimate,
-            now_ns: inputs.time_ns.saturating_add(inputs.lateness_ns),
+            now_ns: inputs.compared_ns(),
             link: robot.link(),
             sent: &self.tick.command,
         };
