@@ -1,9 +1,12 @@
-//! The prompt of the emulated robot.
+//! The emulated robot as a program: its prompt, its address, its end.
 
+use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::Duration;
+
+use crate::program::{Program, assert_shows};
 
 /// Regressions: after a line that is not UTF-8 no fault was taken any more, without a word; a line without an end was kept whole, up to
 /// the end of the memory.
@@ -23,4 +26,58 @@ fn faults_are_taken_after_a_line_that_is_none() {
     emulator.kill().unwrap();
     emulator.wait().unwrap();
     assert_eq!(done, ["done: loss 5", "done: loss 7"]);
+}
+
+/// The first line of an emulator on `address`, and the process.
+fn listening(program: &Program, address: &str) -> (String, Child) {
+    let mut emulator = program.command(&["emulate", "--bind", address]).stdout(Stdio::piped()).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(emulator.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    (line, emulator)
+}
+
+/// Regression: a name was refused as an address, and the line for the console held an address that is none.
+#[test]
+fn an_emulator_takes_a_name_and_prints_an_address_that_can_be_driven() {
+    let program = Program::new();
+    for (given, listens, drives) in
+        [("localhost:0", "listens on ", ""), ("0.0.0.0:0", "listens on 0.0.0.0:", "127.0.0.1:")]
+    {
+        let (line, mut emulator) = listening(&program, given);
+        emulator.kill().unwrap();
+        emulator.wait().unwrap();
+        assert_shows(&line, &[listens, &format!("quadfrog --robot go1 --address {drives}")]);
+    }
+    let output = program.run(&["emulate", "--bind", "here"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert_shows(&message, &["--bind here: ", "give HOST:PORT, for example 127.0.0.1:8007"]);
+}
+
+/// A library for the program: waits until a time fail after the first hundred, as with a system that has lost its clock.
+const LOST_CLOCK: &str = r#"
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <time.h>
+int clock_nanosleep(clockid_t clock, int flags, const struct timespec *until, struct timespec *left) {
+    static int waits;
+    int (*real)(clockid_t, int, const struct timespec *, struct timespec *) = dlsym(RTLD_NEXT, "clock_nanosleep");
+    return flags == TIMER_ABSTIME && ++waits > 100 ? EINVAL : real(clock, flags, until, left);
+}
+"#;
+
+/// Regression: the program went on without its robot, and answered faults with "done".
+#[test]
+fn an_emulator_whose_robot_ends_is_an_error() {
+    let program = Program::new();
+    fs::write(program.path("clock.c"), LOST_CLOCK).unwrap();
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-o", "clock.so", "clock.c", "-ldl"]).current_dir(program.path(""));
+    assert!(compiler.status().unwrap().success());
+    let mut emulate = program.command(&["emulate", "--bind", "127.0.0.1:0"]);
+    let output = emulate.env("LD_PRELOAD", program.path("clock.so")).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_shows(&message, &["the monotonic clock"]);
 }

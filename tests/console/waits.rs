@@ -91,9 +91,15 @@ fn a_worker_that_waits_for_another_ones_trial_says_so() {
 #[test]
 fn threads_that_the_system_does_not_grant_are_an_error() {
     let program = Program::new();
-    let output = without_threads(&program, &["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"]);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{message}");
-    assert!(!message.contains("panicked") && !message.contains("defect"), "{message}");
-    assert_shows(&message, &["thread"]);
+    let optimize = ["optimize", "--trials", "2", "--jobs", "2", "--seed", "0-1"];
+    let emulate = ["emulate", "--bind", "127.0.0.1:0"];
+    let with_link = ["bench", "loop", "--seconds", "0.1", "--with-link"];
+    for arguments in [&optimize[..], &emulate, &["doctor"], &with_link, &with_link[..4]] {
+        let output = without_threads(&program, arguments);
+        let printed = [output.stdout, output.stderr].concat();
+        let message = String::from_utf8_lossy(&printed);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {message}");
+        assert!(!message.contains("panicked") && !message.contains("defect"), "{arguments:?}: {message}");
+        assert_shows(&message, &["thread"]);
+    }
 }

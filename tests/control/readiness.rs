@@ -58,7 +58,7 @@ impl EmulatedBench {
 
 /// Each condition with the defect that breaks it, its time in ms, too short for another failsafe, and a part of the reason that the
 /// operator sees.
-const CONDITIONS: [(Defect, u32, &str); 8] = [
+const CONDITIONS: [(Defect, u32, &str); 9] = [
     // A link that loses states (with 40 % lost an earlier version jumped).
     (Defect::Emulator("loss 3"), 700, "%, a jump needs at most 1.0 %; check the cable"),
     // Foot sensors of another scale (jumped by an earlier version, without Virtual Model Control).
@@ -74,6 +74,8 @@ const CONDITIONS: [(Defect, u32, &str); 8] = [
     // Every other tick late (5465 of 9000 were late in an earlier version, which jumped).
     (Defect::LateTicks(2), 300, "%, a jump needs at most 1.0 %; end other programs"),
     (Defect::Emulator("battery 12"), 20, "battery at 12 %"),
+    // The usual byte for "not available".
+    (Defect::Emulator("battery 255"), 20, "battery does not report a charge"),
 ];
 
 #[test]

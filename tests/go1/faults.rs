@@ -9,11 +9,12 @@ use std::net::{SocketAddr, UdpSocket};
 
 use bench::{Bench, shipped};
 use go1::{ANY_PORT, emulator, network};
+use quadfrog::control::arming::sentence;
 use quadfrog::robot::go1::Go1;
 use quadfrog::robot::go1::packet::{CrcForm, LowCmd, LowState, MODE_SERVO, POSITION_STOP};
 use quadfrog::robot::{JOINTS, JointCommand, LinkStatus, Placement, Robot, RobotError, RobotState};
 use quadfrog::sim::emulator::Emulator;
-use quadfrog::telemetry::{Command, CommandRefusal, Event, Fault, Mode, Tick, TrialEnd};
+use quadfrog::telemetry::{ArmingCheck, Command, CommandRefusal, Event, Fault, Mode, Tick, TrialEnd};
 use quadfrog::trial::Backend;
 
 /// UDP proxy between controller and emulator that keeps the last command.
@@ -314,6 +315,22 @@ fn a_low_battery_and_a_warm_motor_let_the_trial_finish_and_refuse_the_next() {
         assert_eq!(bench.cycle.mode(), Mode::Ready, "{fault}");
         assert!(matches!(bench.refusal(), Some(CommandRefusal::Inhibited(_))), "{fault}: {:?}", bench.events);
     }
+}
+
+/// Regression: the emulator took no charge above 100 %, the usual byte for "not available".
+#[test]
+fn a_battery_that_reports_no_charge_refuses_arming() {
+    let mut bench = in_mode(Mode::Disarmed);
+    bench.inject("battery 255");
+    bench.ticks(1500);
+    bench.command(bench.arm());
+    let refused = bench.refusal();
+    let Some(CommandRefusal::Checks(failing)) = refused else { panic!("{refused:?}") };
+    assert_eq!(failing.iter().collect::<Vec<_>>(), [ArmingCheck::Battery]);
+    let findings = bench.cycle.readiness().findings;
+    let limits = shipped(Backend::Hardware).2.arming;
+    let sentence = sentence(findings.get(ArmingCheck::Battery).unwrap(), &limits);
+    assert_eq!((sentence.found.as_str(), sentence.needed.as_str()), ("not known yet", "at least 30 %"));
 }
 
 /// A robot that has never answered gets hello commands only.

@@ -27,7 +27,7 @@ pub enum EmulatorFault {
     Reboot,
     /// A motor reports this temperature, degrees Celsius.
     Hot { joint: usize, celsius: f64 },
-    /// The battery reports this charge, percent.
+    /// The battery reports this charge, percent; above 100 it reports none.
     Battery(f64),
     /// A motor leaves servo mode: it brakes and reports the mode.
     ServoOff { joint: usize },
@@ -106,7 +106,7 @@ const FAULTS: [(&str, FaultOperands, &str); 32] = {
             JointNumber(|joint, celsius| Hot { joint, celsius }, "CELSIUS", -40.0, 127.0),
             "a motor reports this temperature",
         ),
-        ("battery", Number(Battery, "PERCENT", 0.0, 100.0), "the battery reports this charge"),
+        ("battery", Number(Battery, "PERCENT", 0.0, 255.0), "the battery reports this charge; 255: not available"),
         ("servo-off", Joint(|joint| ServoOff { joint }), "a motor leaves servo mode"),
         ("stuck", Joint(|joint| Stuck { joint }), "a joint is stuck at its current angle"),
         (

@@ -203,7 +203,7 @@ impl EmulatedRobot {
 
     fn battery(&self, state: &RobotState) -> Battery {
         let charge_percent = self.defects.charge_percent.unwrap_or(self.config.battery_percent);
-        let cell = CELL_V[0] + (CELL_V[1] - CELL_V[0]) * charge_percent / 100.0;
+        let cell = CELL_V[0] + (CELL_V[1] - CELL_V[0]) * charge_percent.min(100.0) / 100.0;
         let voltage_v = cell * CELLS as f64;
         let mechanical: f64 =
             state.joint_torque_n_m.iter().zip(&state.joint_velocity_rad_s).map(|(torque, dq)| torque * dq).sum();

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -253,6 +254,14 @@ impl DdsArguments {
         };
         Err(Failure::input(format!("{given}: {reason}; add --robot go2")))
     }
+}
+
+/// Resolves `HOST:PORT`, the value of `option`. `example` is one of its values.
+pub fn address(option: &str, text: &str, example: &str) -> Result<SocketAddr, Failure> {
+    let refuse =
+        |reason: String| Failure::input(format!("{option} {text}: {reason}; give HOST:PORT, for example {example}"));
+    let mut found = text.to_socket_addrs().map_err(|error| refuse(error.to_string()))?;
+    found.next().ok_or_else(|| refuse("no such host".to_owned()))
 }
 
 /// Longest name of an operator, a machine or a robot, characters.

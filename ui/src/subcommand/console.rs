@@ -1,6 +1,5 @@
 //! The console on a running engine.
 
-use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 
 use crate::app::{self, ConsoleExit, ConsoleOptions};
@@ -281,7 +280,9 @@ fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Res
     };
     let mut network = robot.network(files, model)?;
     match (&arguments.address, &mut network) {
-        (Some(text), Network::Go1(network)) => network.address = address(text)?,
+        (Some(text), Network::Go1(network)) => {
+            network.address = arguments::address("--address", text, "192.168.123.10:8007")?;
+        }
         (Some(text), Network::Go2(_)) => {
             return Err(Failure::input(format!(
                 "--address {text}: a Go2 is found in its DDS domain; give --interface and --domain"
@@ -324,15 +325,6 @@ fn take_over(
 /// Returns the name of a recording while it is written.
 fn part_of(recording: &Path) -> PathBuf {
     recording.with_extension("mcap.part")
-}
-
-/// Resolves `HOST:PORT`.
-fn address(text: &str) -> Result<SocketAddr, Failure> {
-    let refuse = |reason: String| {
-        Failure::input(format!("--address {text}: {reason}; give HOST:PORT, for example 192.168.123.10:8007"))
-    };
-    let mut found = text.to_socket_addrs().map_err(|error| refuse(error.to_string()))?;
-    found.next().ok_or_else(|| refuse("no such host".to_owned()))
 }
 
 /// Returns the settings of `console.toml`.

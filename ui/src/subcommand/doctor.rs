@@ -144,7 +144,8 @@ fn timer() -> DoctorItem {
 
 /// Requests the scheduling of the control thread on hardware, and measures wake-ups with what was granted.
 fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
-    let measured = std::thread::spawn(move || {
+    const LATENCY: &str = "wake-up latency";
+    let measured = std::thread::Builder::new().name("control".into()).spawn(move || {
         let granted = scheduling.apply();
         let mut lateness = Vec::with_capacity(WAKE_UPS);
         let paced = thread::pace(Duration::from_millis(1), thread::CONTROL_TICK_OFFSET, |instant| {
@@ -154,7 +155,13 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
         lateness.sort_unstable();
         paced.map(|()| (granted, lateness))
     });
-    const LATENCY: &str = "wake-up latency";
+    let measured = match measured {
+        Ok(measured) => measured,
+        Err(error) => {
+            let remedy = "allow this user more processes: `ulimit -u` shows the limit";
+            return vec![DoctorItem::broken(LATENCY, format!("the system grants no thread: {error}"), remedy)];
+        }
+    };
     match measured.join() {
         Ok(Ok((granted, lateness))) => {
             let settings: Vec<_> = granted.granted.iter().map(ToString::to_string).collect();

@@ -1,11 +1,12 @@
 //! `quadfrog emulate`: serves the simulator as a Go1 or Go2 on the network; faults come from arguments and standard input.
 
 use std::io::{BufRead, Read as _};
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use crate::{notice, put, put_line};
@@ -30,6 +31,8 @@ const LONGEST_LINE: u64 = 1024;
 /// Period of the status report.
 const REPORT_PERIOD: Duration = Duration::from_millis(200);
 
+/// Address of an emulated Go1 that no argument names.
+const DEFAULT_ADDRESS: &str = "127.0.0.1:8007";
 /// DDS domain and interface of an emulated Go2 that no argument names. A real one is in domain 0.
 const EMULATED_DOMAIN: u16 = 1;
 const LOOPBACK: &str = "lo";
@@ -44,8 +47,8 @@ fn robot() -> impl TypedValueParser<Value = RealRobot> {
 #[derive(Debug, Args)]
 pub struct EmulateArguments {
     /// Address on which a Go1 listens
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8007")]
-    bind: SocketAddr,
+    #[arg(long, value_name = "HOST:PORT", default_value = DEFAULT_ADDRESS)]
+    bind: String,
     /// Seed of all random numbers: sensors, terrain, network
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole_number(0_u64..=u64::MAX))]
     seed: u64,
@@ -75,7 +78,8 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         (settings.domain, settings.interface) = (EMULATED_DOMAIN, LOOPBACK.to_owned());
     }
     arguments.dds.apply(&mut network)?;
-    let emulator = Emulator::serve(&network, arguments.bind, &description, &config.simulator, arguments.seed);
+    let bind = arguments::address("--bind", &arguments.bind, DEFAULT_ADDRESS)?;
+    let emulator = Emulator::serve(&network, bind, &description, &config.simulator, arguments.seed);
     let mut emulator = emulator.map_err(Failure::input)?;
     arguments.faults.iter().for_each(|&fault| emulator.apply(fault));
     // Before the threads start, so that all of them inherit the blocked signals and only `wait` receives them.
@@ -91,8 +95,9 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         (Network::Go1(_), address) => {
             let address = address.context("the address of the socket")?;
             put_line!(
-                "A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {address}",
-                description.name
+                "A {} listens on {address}. Drive it:  quadfrog --robot go1 --address {}",
+                description.name,
+                on_this_machine(address)
             );
         }
     }
@@ -101,26 +106,48 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let handle = emulator.handle();
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
-    let robot = std::thread::spawn(move || {
+    let robot = start_thread("robot", move || {
         pace(Duration::from_secs_f64(CONTROL_PERIOD_S), Duration::ZERO, |start| {
             emulator.step_at(start.planned_ns);
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
-    });
+    })?;
     let (flag, watched) = (ending.clone(), handle.clone());
-    let reporter = std::thread::spawn(move || report(&watched, &flag));
-    // Not joined: a blocked read cannot be interrupted.
-    std::thread::spawn(move || read_faults(&handle));
+    let reporter = start_thread("report", move || report(&watched, &flag))?;
+    // Neither is joined: a blocked read cannot be interrupted, and the robot's thread may end without a signal.
+    start_thread("faults", move || read_faults(&handle))?;
+    let flag = ending.clone();
+    start_thread("signals", move || {
+        // If the wait fails, the robot runs until the process is killed.
+        if ends.wait().is_ok() {
+            flag.store(true, Ordering::Release);
+        }
+    })?;
 
-    // If the wait fails, the robot runs until the process is killed.
-    if ends.wait().is_ok() {
-        ending.store(true, Ordering::Release);
-    }
     let paced = robot.join().map_err(|_| anyhow!("the robot's thread panicked"))?;
+    ending.store(true, Ordering::Release);
     let _ = reporter.join();
     paced.context("the monotonic clock")?;
     put_line!("The robot is switched off.");
     Ok(())
+}
+
+/// Starts a thread with the name `name`.
+fn start_thread<T: Send + 'static>(
+    name: &str,
+    act: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, Failure> {
+    Ok(Builder::new().name(name.to_owned()).spawn(act).with_context(|| format!("the thread `{name}`"))?)
+}
+
+/// Returns the address at which a program of this machine reaches a socket that listens on `address`.
+fn on_this_machine(address: SocketAddr) -> SocketAddr {
+    let ip = match address.ip() {
+        ip if !ip.is_unspecified() => ip,
+        IpAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
+        IpAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
+    };
+    SocketAddr::new(ip, address.port())
 }
 
 /// Applies faults from standard input until its end.

@@ -225,7 +225,7 @@ fn measure(
     let mut robot = Go1::open(&Go1Network { address, local_port: 0, ..network }, false).map_err(Failure::input)?;
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
-    let emulated = std::thread::spawn(move || {
+    let emulated = std::thread::Builder::new().name("robot".into()).spawn(move || {
         // Another core: the emulated robot must keep its period without the core of the measured thread.
         let core = scheduling.core.map(|core| usize::from(core == 0));
         let _granted = Scheduling { priority: scheduling.priority.saturating_sub(1), core, ..scheduling }.apply();
@@ -234,6 +234,7 @@ fn measure(
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     });
+    let emulated = emulated.context("the thread of the emulated robot")?;
     let measured =
         machine::in_a_thread(move || stand_and_measure(scheduling, &settings, ticks, lead, measurement, &mut robot));
     ending.store(true, Ordering::Release);
