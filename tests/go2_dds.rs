@@ -23,7 +23,7 @@ use quadfrog::config::Config;
 use quadfrog::realtime::thread::pace;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
 use quadfrog::robot::go2::dds::{Participant, TopicType};
-use quadfrog::robot::hardware::{DampingRoute, Network};
+use quadfrog::robot::hardware::{DampingRoute, HardwareError, Network};
 use quadfrog::robot::{JointCommand, LinkStatus, Robot, RobotState};
 use quadfrog::sim::emulator::{Emulator, EmulatorFault, EmulatorHandle};
 use serde_json::Value;
@@ -52,6 +52,11 @@ fn network(domain: u16, state_period_ms: u32) -> Network {
 
 fn lying() -> RobotDescription {
     files().description().unwrap()
+}
+
+/// Takes the robot over from its own controller, without an interruption.
+fn take_over(network: &Network, report: &mut dyn FnMut(&str)) -> Result<Option<String>, HardwareError> {
+    network.take_over(&lying().lying_position, &AtomicBool::new(false), report)
 }
 
 /// The peer in Python.
@@ -150,7 +155,7 @@ fn a_robot_of_the_python_sdk_is_taken_over_commanded_and_given_back() {
     let Some(peer) = Peer::start("robot", domain, 25) else { return };
     let network = network(domain, 2);
     let mut steps = Vec::new();
-    let released = network.take_over(&lying().lying_position, &mut |step| steps.push(step.to_owned())).unwrap();
+    let released = take_over(&network, &mut |step| steps.push(step.to_owned())).unwrap();
     assert_eq!(released.as_deref(), Some("normal"), "{steps:?}");
     let (mut robot, _) = network.open(3.0).unwrap();
     tick_until(&mut *robot, None, |link| link.received > 50);
@@ -216,7 +221,7 @@ fn commands_of_other_programs_are_counted() {
     // Not released: the robot's own controller commands.
     let link = tick_until(&mut *robot, Some(JointCommand::damping(3.0)), |link| link.foreign_commands > 100);
     assert!(link.sent > 0, "{link:?}");
-    network(domain, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    take_over(&network(domain, 1), &mut |_| {}).unwrap();
     tick(&mut *robot, 500, None);
     let before = tick(&mut *robot, 10, None).1.foreign_commands;
     let guard = Participant::join(domain, Ipv4Addr::LOCALHOST).unwrap();
@@ -285,7 +290,7 @@ fn the_guards_commands_in_a_silence_are_not_counted() {
 fn a_robot_that_restarts_is_commanded_by_its_own_controller_again() {
     let domain = domain();
     let emulated = Emulated::start(domain);
-    network(domain, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    take_over(&network(domain, 1), &mut |_| {}).unwrap();
     let (mut robot, _) = network(domain, 1).open(3.0).unwrap();
     let damping = Some(JointCommand::damping(3.0));
     tick_until(&mut *robot, damping, |link| link.received > 100 && link.sent > 1000);
@@ -307,7 +312,7 @@ fn a_robot_whose_states_end_keeps_its_controller() {
                 emulated.handle.apply(fault);
             }
         };
-        let error = network(domain, 1).take_over(&lying().lying_position, &mut inject).unwrap_err().to_string();
+        let error = take_over(&network(domain, 1), &mut inject).unwrap_err().to_string();
         assert!(error.contains("no state of the robot for"), "{error}");
         emulated.handle.apply(EmulatorFault::Clear);
         let commands = emulated.handle.status().commands;
@@ -326,9 +331,25 @@ fn a_takeover_that_fails_after_the_release_was_sent_names_the_controller() {
             emulated.handle.apply(EmulatorFault::Freeze);
         }
     };
-    let error = network(domain, 1).take_over(&lying().lying_position, &mut inject).unwrap_err();
+    let error = take_over(&network(domain, 1), &mut inject).unwrap_err();
     assert_eq!(error.released_controller(), Some("normal"), "{error}");
 }
+
+/// Regression: Ctrl-C in a takeover ended the program, and the robot had no controller to be given back to.
+#[test]
+fn a_takeover_that_is_interrupted_after_the_release_names_the_controller() {
+    let domain = domain();
+    let _emulated = Emulated::start(domain);
+    let (interrupted, mut releasing) = (AtomicBool::new(false), false);
+    // The step after the release.
+    let mut interrupt = |step: &str| {
+        interrupted.fetch_or(releasing, Ordering::AcqRel);
+        releasing |= step.starts_with("releasing");
+    };
+    let error = network(domain, 1).take_over(&lying().lying_position, &interrupted, &mut interrupt).unwrap_err();
+    assert_eq!(error.released_controller(), Some("normal"), "{error}");
+}
+    assert!(error.to_string().contains("interrupted"), "{error}");
 
 /// Regression: the controller was started at once, while a console made the robot stand.
 #[test]
@@ -336,7 +357,7 @@ fn a_robot_that_is_commanded_unseen_or_raised_is_not_given_back() {
     let domain = domain();
     let emulated = Emulated::start(domain);
     let network = network(domain, 1);
-    network.take_over(&lying().lying_position, &mut |_| {}).unwrap();
+    take_over(&network, &mut |_| {}).unwrap();
     let (mut robot, _) = network.open(3.0).unwrap();
     let damping = Some(JointCommand::damping(3.0));
     tick_until(&mut *robot, damping, |link| link.received > 100);
@@ -393,7 +414,7 @@ fn a_silent_domain_and_a_wrong_type_are_said() {
     let begun = Instant::now();
     let mut steps = Vec::new();
     let mut report = |step: &str| steps.push((begun.elapsed(), step.to_owned()));
-    let error = network(empty, 1).take_over(&lying().lying_position, &mut report).unwrap_err().to_string();
+    let error = take_over(&network(empty, 1), &mut report).unwrap_err().to_string();
     assert!(error.contains("no state") && error.contains("--domain"), "{error}");
     let (said, words) = steps.iter().find(|(_, step)| step.contains("no state yet")).unwrap();
     assert!(words.contains("no other program"), "{words}");
@@ -401,7 +422,7 @@ fn a_silent_domain_and_a_wrong_type_are_said() {
 
     let other = domain();
     let Some(peer) = Peer::start("wrong-type", other, 16) else { return };
-    let error = network(other, 1).take_over(&lying().lying_position, &mut |_| {}).unwrap_err().to_string();
+    let error = take_over(&network(other, 1), &mut |_| {}).unwrap_err().to_string();
     assert!(error.contains("LowCmd_, expected unitree_go::msg::dds_::LowState_"), "{error}");
     peer.counts();
 }

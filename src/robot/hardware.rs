@@ -2,6 +2,7 @@
 //! [`go1`] and [`go2`] and a variant here (`docs/extend/robot.md`).
 
 use std::net::{Ipv4Addr, UdpSocket};
+use std::sync::atomic::AtomicBool;
 
 use super::description::{DescriptionError, RobotFiles};
 use super::go1::{self, Go1};
@@ -172,15 +173,20 @@ impl Network {
     }
 
     /// Takes a robot over from its own controller, which lets it lie down first; a robot without one is left alone. `report`
-    /// receives each step. Returns the name of the released controller; none if none was active.
+    /// receives each step; `interrupted` ends it. Returns the name of the released controller; none if none was active.
     ///
     /// # Errors
-    /// The robot does not answer, does not lie, or keeps its controller; nothing was sent to its motors. The error holds the name of
-    /// a controller that may be released.
-    pub fn take_over(&self, lying_rad: &Joints, report: &mut dyn FnMut(&str)) -> Result<Option<String>, HardwareError> {
+    /// The robot does not answer, does not lie, or keeps its controller, or the takeover was interrupted; nothing was sent to its
+    /// motors. The error holds the name of a controller that may be released.
+    pub fn take_over(
+        &self,
+        lying_rad: &Joints,
+        interrupted: &AtomicBool,
+        report: &mut dyn FnMut(&str),
+    ) -> Result<Option<String>, HardwareError> {
         match self {
             Network::Go1(_) => Ok(None),
-            Network::Go2(network) => take_over_go2(network, lying_rad, report),
+            Network::Go2(network) => take_over_go2(network, lying_rad, interrupted, report),
         }
     }
 
@@ -200,10 +206,11 @@ impl Network {
 fn take_over_go2(
     network: &go2::network::Go2Network,
     lying_rad: &Joints,
+    interrupted: &AtomicBool,
     report: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, HardwareError> {
     let participant = go2::dds::Participant::join(network.domain, network.address()?)?;
-    go2::services::take_over(&participant, lying_rad, network.reliable_commands, report)
+    go2::services::take_over(&participant, lying_rad, network.reliable_commands, interrupted, report)
         .map_err(HardwareError::Takeover)
 }
 
@@ -211,6 +218,7 @@ fn take_over_go2(
 fn take_over_go2(
     _: &go2::network::Go2Network,
     _: &Joints,
+    _: &AtomicBool,
     _: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, HardwareError> {
     Err(HardwareError::WithoutGo2)

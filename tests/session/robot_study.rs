@@ -269,7 +269,10 @@ fn over_the_network(kind: Kind, seed: u32, trials: u32, late_ms: f64) -> Outcome
     let config = config(kind, late_ms);
     let robot = LivingRobot::new(kind, &config, seed.into());
     let folder = tempfile::tempdir().unwrap();
-    robot.network.take_over(&kind.description().lying_position, &mut |step| println!("{step}")).unwrap();
+    robot
+        .network
+        .take_over(&kind.description().lying_position, &AtomicBool::new(false), &mut |step| println!("{step}"))
+        .unwrap();
     let mut options = options(kind, config, Some(robot.network.clone()), Backend::Hardware, seed, trials);
     options.folder = Some(folder.path().join("study"));
     let mut operator = Operator {

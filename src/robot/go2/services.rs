@@ -1,5 +1,6 @@
 //! The robot's services over DDS: takes the robot over from its own controller.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::dds::{DdsError, FoundEndpoint, Participant, TopicReader, TopicType, TopicWriter};
@@ -24,6 +25,8 @@ pub enum TakeoverError {
     DemandsReliable,
     #[error("the robot does not read commands: {0}")]
     NoReader(String),
+    #[error("interrupted by the operator")]
+    Interrupted,
 }
 
 /// A takeover that failed.
@@ -98,18 +101,22 @@ impl States {
 }
 
 /// Takes the robot over: waits for states, lets it lie down, and releases its own controller. `lying_rad` is the lying pose;
-/// `reliable` whether commands will be sent reliably; `report` receives each new step, and once, after 2 s without states, what was found in the domain instead. Returns the name of the released controller; none if none was active.
+/// `reliable` whether commands will be sent reliably; `interrupted` ends the takeover before its next request; `report` receives each
+/// new step, and once, after 2 s without states, what was found in the domain instead. Returns the name of the released controller;
+/// none if none was active.
 ///
 /// # Errors
-/// The handover failed, or no reader of commands was found; no command has been sent to a motor.
+/// The handover failed or was interrupted, or no reader of commands was found; no command has been sent to a motor.
 pub fn take_over(
     participant: &Participant,
     lying_rad: &Joints,
     reliable: bool,
+    interrupted: &AtomicBool,
     report: &mut dyn FnMut(&str),
 ) -> Result<Option<String>, TakeoverFailure> {
     let mut handover = Handover::begin(0, lying_rad, first_id());
-    let ended = hand_over(participant, &mut handover, report).and_then(|()| wait_for_reader(participant, reliable));
+    let ended = hand_over(participant, &mut handover, interrupted, report)
+        .and_then(|()| wait_for_reader(participant, reliable, interrupted));
     let released = handover.released_controller().map(str::to_owned);
     match ended {
         Ok(()) => Ok(released),
@@ -121,6 +128,7 @@ pub fn take_over(
 fn hand_over(
     participant: &Participant,
     handover: &mut Handover,
+    interrupted: &AtomicBool,
     report: &mut dyn FnMut(&str),
 ) -> Result<(), TakeoverError> {
     let mut states = States::open(participant)?;
@@ -130,6 +138,7 @@ fn hand_over(
     let (mut reported, mut is_late) = (None, false);
     loop {
         states.receive();
+        check_interrupted(interrupted)?;
         let now_ms = begun.elapsed().as_millis() as u64;
         for service in &mut services {
             while let Some(response) = service.response() {
@@ -176,10 +185,15 @@ const fn words(step: &HandoverStatus) -> &'static str {
     }
 }
 
+fn check_interrupted(interrupted: &AtomicBool) -> Result<(), TakeoverError> {
+    if interrupted.load(Ordering::Acquire) { Err(TakeoverError::Interrupted) } else { Ok(()) }
+}
+
 /// Waits until a reader of commands is found that takes ours.
-fn wait_for_reader(participant: &Participant, reliable: bool) -> Result<(), TakeoverError> {
+fn wait_for_reader(participant: &Participant, reliable: bool, interrupted: &AtomicBool) -> Result<(), TakeoverError> {
     let (commands, begun) = (TopicType::low_command(), Instant::now());
     loop {
+        check_interrupted(interrupted)?;
         let readers = participant.readers();
         let fits = |found: &&FoundEndpoint| found.topic == commands.topic && found.type_name == commands.type_name;
         let found: Vec<_> = readers.iter().filter(fits).collect();

@@ -1,6 +1,8 @@
 //! The console on a running engine.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::app::{self, ConsoleExit, ConsoleOptions};
 use crate::connection::TerminalLocation;
@@ -29,6 +31,7 @@ use super::completion;
 use super::failure::Failure;
 use super::live;
 use super::selection::{SelectedStudy, study_to_continue};
+use super::signals::{exit_by, on_signal};
 
 fn colour() -> impl TypedValueParser<Value = ColourChoice> {
     one_of([
@@ -204,15 +207,16 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     let selected = if arguments.observe { selected } else { selected.with_folder()? };
     let folder = selected.folder;
     options.folder = (!arguments.observe).then(|| folder.clone());
+    let takeover = Arc::<Takeover>::default();
     let released = match &options.network {
-        Some(network) if !arguments.observe => take_over(network, arguments, &options.robot)?,
+        Some(network) if !arguments.observe => take_over(network, arguments, &options.robot, &takeover)?,
         _ => None,
     };
-    let ended = run_session(options, console, continued);
+    let ended = run_session(options, console, continued, &takeover);
     // A terminal that has hung up shows nothing.
     let hung_up = matches!(ended, Ok((ConsoleExit::HungUp, _)));
     if let Some(controller) = released.filter(|_| !hung_up) {
-        print_give_back(arguments, &controller, "is released, the legs are not supported");
+        put_line!("{}", way_back(arguments, &controller, IS_RELEASED));
     }
     let (exit, recorded) = ended?;
     let recording = recorded.as_ref().map(|status| match status {
@@ -246,6 +250,7 @@ fn run_session(
     options: Options,
     console: ConsoleOptions,
     continued: Option<String>,
+    takeover: &Takeover,
 ) -> Result<(ConsoleExit, Option<RecorderStatus>), Failure> {
     let handle = engine::start(options)?;
     if let Some(continued) = continued {
@@ -253,20 +258,65 @@ fn run_session(
     }
     let recorder = handle.recorder_watch();
     notice_waits(None);
+    *takeover.phase() = TakeoverPhase::Running;
     let exit = app::run(Feed::live(handle), console)?;
     Ok((exit, recorder.map(|recorder| recorder.get())))
 }
 
-/// Prints the command that starts the robot's own controller again. `state` is what is known about it.
-fn print_give_back(arguments: &ConsoleArguments, controller: &str, state: &str) {
+/// A takeover, until the console runs. A signal in this time ends the program once the way back was printed.
+#[derive(Debug, Default)]
+struct Takeover {
+    interrupted: AtomicBool,
+    phase: Mutex<TakeoverPhase>,
+}
+
+/// Phase of a takeover: it decides over a signal.
+#[derive(Debug, Default)]
+enum TakeoverPhase {
+    /// A signal interrupts the takeover.
+    #[default]
+    TakingOver,
+    /// The engine starts: a signal prints the way back of a released controller, and ends the program.
+    Starting(Option<String>),
+    /// The console takes the signals.
+    Running,
+}
+
+impl Takeover {
+    /// Begins to take signals.
+    fn watch_signals(self: &Arc<Takeover>) -> Result<(), Failure> {
+        let takeover = self.clone();
+        on_signal(move |signal| {
+            takeover.interrupted.store(true, Ordering::Release);
+            if let TakeoverPhase::Starting(way_back) = &*takeover.phase() {
+                if let Some(text) = way_back {
+                    put_line!("{text}");
+                }
+                exit_by(signal);
+            }
+        })
+    }
+
+    fn phase(&self) -> MutexGuard<'_, TakeoverPhase> {
+        self.phase.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// State of the robot's own controller after a takeover, in [`way_back`].
+const IS_RELEASED: &str = "is released, the legs are not supported";
+
+/// Returns the text with the command that starts the robot's own controller again. `state` is what is known about it.
+fn way_back(arguments: &ConsoleArguments, controller: &str, state: &str) -> String {
     let DdsArguments { interface, domain } = &arguments.dds;
     let option =
         |name: &str, value: Option<String>| value.map_or_else(String::new, |value| format!(" --{name} {value}"));
     let model = option("model", arguments.study.model.clone());
     let interface = option("interface", interface.clone());
     let domain = option("domain", domain.map(|domain| domain.to_string()));
-    put_line!("The robot's own controller {controller} {state}. To start it again, lying:");
-    put_line!("  quadfrog give-back --controller {controller}{model}{interface}{domain}");
+    format!(
+        "The robot's own controller {controller} {state}. To start it again, lying:\n  \
+         quadfrog give-back --controller {controller}{model}{interface}{domain}"
+    )
 }
 
 /// Returns the settings of the network to the robot; none for the simulator, which takes no address.
@@ -302,6 +352,7 @@ fn take_over(
     network: &Network,
     arguments: &ConsoleArguments,
     robot: &RobotDescription,
+    takeover: &Arc<Takeover>,
 ) -> Result<Option<String>, Failure> {
     if matches!(network, Network::Go1(_)) {
         return Ok(None);
@@ -313,13 +364,23 @@ fn take_over(
     if answer.trim() != "yes" {
         return Err(Failure::input("the robot was not taken over: the answer was not yes"));
     }
-    let released = network.take_over(&robot.lying_position, &mut |step| put_line!("  {step}"));
-    released.map_err(|error| {
+    takeover.watch_signals()?;
+    let interrupted = &takeover.interrupted;
+    let taken = network.take_over(&robot.lying_position, interrupted, &mut |step| put_line!("  {step}"));
+    let released = taken.map_err(|error| {
         if let Some(controller) = error.released_controller() {
-            print_give_back(arguments, controller, "may be released: the legs may not be supported");
+            put_line!("{}", way_back(arguments, controller, "may be released: the legs may not be supported"));
         }
-        Failure::input(error)
-    })
+        if interrupted.load(Ordering::Acquire) { Failure::Other(error.into()) } else { Failure::input(error) }
+    })?;
+    let text = released.as_ref().map(|controller| way_back(arguments, controller, IS_RELEASED));
+    *takeover.phase() = TakeoverPhase::Starting(text.clone());
+    // A signal between the last request and this phase.
+    if interrupted.load(Ordering::Acquire) {
+        put_line!("{}", text.unwrap_or_default());
+        return Err(Failure::Other(anyhow!("interrupted by the operator")));
+    }
+    Ok(released)
 }
 
 /// Returns the name of a recording while it is written.

@@ -29,6 +29,7 @@ mod report;
 mod reproduce;
 mod screenshot;
 mod selection;
+mod signals;
 mod study;
 mod table;
 mod verify;

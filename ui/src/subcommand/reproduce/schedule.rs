@@ -4,20 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::notice;
-use anyhow::anyhow;
-use nix::sys::signal::Signal;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::in_parallel;
-use tokio::signal::unix::{SignalKind, signal};
 
 use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
 use super::results::ReproduceResults;
 use super::work::{JobResult, Workplace};
 use crate::subcommand::failure::Failure;
 use crate::subcommand::progress::Progress;
-
-/// Exit status of a program that a signal ended, less the signal's number.
-const BY_SIGNAL: i32 = 128;
+use crate::subcommand::signals::{exit_by, on_signal};
 
 /// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to
 /// `interrupted`. The results do not depend on the number of threads.
@@ -103,27 +98,9 @@ impl KeptResults {
 
 /// Ends the process on Ctrl-C, SIGTERM or the loss of the terminal, at once, after the complete experiments were written.
 fn write_when_interrupted(kept: Arc<KeptResults>) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| Failure::Other(anyhow!("signals cannot be received: {error}"));
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-    let register = |kind| {
-        let _context = runtime.enter();
-        signal(kind).map_err(failed)
-    };
-    // Registered here: from now on a signal does not end the process before the results are written.
-    let (mut interrupt, mut terminate, mut hang_up) =
-        (register(SignalKind::interrupt())?, register(SignalKind::terminate())?, register(SignalKind::hangup())?);
-    let wait = move || {
-        let ended_by = runtime.block_on(async {
-            tokio::select! {
-                _ = interrupt.recv() => Signal::SIGINT,
-                _ = terminate.recv() => Signal::SIGTERM,
-                _ = hang_up.recv() => Signal::SIGHUP,
-            }
-        });
+    on_signal(move |signal| {
         let message = kept.keep();
         notice!("{message}");
-        std::process::exit(BY_SIGNAL + ended_by as i32);
-    };
-    std::thread::Builder::new().name("interrupt".to_owned()).spawn(wait).map_err(failed)?;
-    Ok(())
+        exit_by(signal);
+    })
 }
