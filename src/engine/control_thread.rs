@@ -1,5 +1,5 @@
 //! The control thread: applies the real-time settings, then runs the control loop at 1 kHz. On exit, also after a panic, it
-//! keeps sending damping commands.
+//! keeps sending damping commands; a robot that they do not reach is left to the guard.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -69,8 +69,16 @@ struct Ticking<'a, C> {
 }
 
 impl<C> Ticking<'_, C> {
+    /// Whether the robot is commanded and the commands do not reach it.
+    fn is_cut_off(&self) -> bool {
+        self.control_loop.mode().commanded() && !self.robot.delivers()
+    }
+
+    /// Sends the guard a heartbeat when one is due; none while the robot is cut off, so that the guard damps it.
     fn send_guard_heartbeat(&mut self) {
-        if let Some(guard_heartbeat) = &mut self.guard_heartbeat {
+        let is_cut_off = self.is_cut_off();
+        // A guard that the robot was not reported to as commanded learns it first.
+        if let Some(guard_heartbeat) = self.guard_heartbeat.as_mut().filter(|sent| !is_cut_off || !sent.commanded()) {
             let silent_ms = guard_heartbeat.count_tick(self.control_loop.mode().commanded());
             self.control_loop.set_guard_silent(silent_ms);
         }
@@ -105,7 +113,7 @@ pub fn drive<C: Clock>(
     let control_loop = ControlLoop::new(start.settings, end);
     let guard_heartbeat = start.guard_heartbeat.take();
     let mut ticking = Ticking { control_loop, robot, clock: start.clock, closing: start.closing, guard_heartbeat };
-    // Afterwards the control loop is only asked for its mode, which a panic does not leave half changed.
+    // Afterwards the control loop is asked for its mode and takes the guard's silence, which a panic does not leave half changed.
     let ended = catch_unwind(AssertUnwindSafe(|| {
         if let Err(error) = paced(&mut ticking) {
             panic!("the control thread cannot read the monotonic clock: {error}");
@@ -122,8 +130,9 @@ pub fn drive<C: Clock>(
             wait();
         }
     }
+    let is_cut_off = ticking.is_cut_off();
     if let Some(guard_heartbeat) = ticking.guard_heartbeat {
-        guard_heartbeat.release();
+        if is_cut_off { guard_heartbeat.leave_robot() } else { guard_heartbeat.release() }
     }
     ended
 }

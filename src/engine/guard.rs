@@ -48,6 +48,8 @@ const DAMPINGS: u32 = 3000;
 const LONGEST_START_MS: u32 = 5000;
 /// Suspension of the computer after which the guard damps, ms; as `watchdog.suspended_ms` of `config/safety.toml`.
 const SUSPENDED_MS: u32 = 50;
+/// Longest duration of these commands, ms: each one is followed by a pause of a millisecond, which a loaded computer prolongs.
+const LONGEST_DAMPING_MS: u32 = 10_000;
 /// Least damping that the guard accepts, N m s/rad: less does not carry the robot down softly.
 const LEAST_DAMPING: f32 = 1.0;
 
@@ -71,6 +73,8 @@ struct GuardFindings {
     /// It has answered once.
     answered: AtomicBool,
     silent_ms: AtomicU32,
+    /// The robot was left to it at the end.
+    has_robot: AtomicBool,
 }
 
 /// The guard process, seen from the engine.
@@ -152,8 +156,16 @@ impl Guard {
         }
     }
 
-    /// Ends the guard, also a stopped one; to be called after the last command.
+    /// Ends the guard, also a stopped one; to be called after the last command. A guard that the robot was left to damps it first.
     pub fn end(mut self) {
+        if self.findings.has_robot.load(Ordering::Acquire) {
+            let is_damping = |process: &mut Child| process.try_wait().is_ok_and(|status| status.is_none());
+            let mut waited_ms = 0;
+            while waited_ms < LONGEST_DAMPING_MS && is_damping(&mut self.process) {
+                std::thread::sleep(Duration::from_millis(1));
+                waited_ms += 1;
+            }
+        }
         // An error means that it has exited already.
         let _ = self.process.kill();
         let _ = self.process.wait();
@@ -182,9 +194,19 @@ impl GuardHeartbeat {
         if self.findings.broken.load(Ordering::Relaxed) { u32::MAX } else { self.reported_ms() }
     }
 
+    /// Whether the last heartbeat reported the robot as commanded.
+    pub const fn commanded(&self) -> bool {
+        self.commanded
+    }
+
     /// Reports to the guard that the robot is not commanded any more.
     pub fn release(mut self) {
         self.send(false);
+    }
+
+    /// Leaves a robot that the commands of this program do not reach to the guard, which damps it.
+    pub fn leave_robot(self) {
+        self.findings.has_robot.store(true, Ordering::Release);
     }
 
     /// Time without an answer, ms; the time that a guard needs to start is not counted.

@@ -20,7 +20,7 @@ pub use folder::{
     study_files, utc_ns,
 };
 pub use ground::TrialGround;
-pub use guard::{GUARD, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};
+pub use guard::{GUARD, Guard, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};
 pub use observers::{
     FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, STOP_BY, SessionFacts, SessionNews,
     WHO_WATCHES, find_sessions,
@@ -40,7 +40,6 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use self::folder::LockedFolder;
-use self::guard::Guard;
 use self::recording::show_unrecorded;
 use self::study::open_without_prior;
 use crate::control::settings::ControlSettings;

@@ -239,9 +239,10 @@ fn give_back_go2(_: &go2::network::Go2Network, _: &Joints, _: &str) -> Result<()
 fn open_go2(network: &go2::network::Go2Network, damping_kd: f64) -> Result<OpenedRobot, HardwareError> {
     let address = network.address()?;
     let command = go2::link::damping(damping_kd).map_err(|error| HardwareError::Damping(error.to_string()))?;
-    let participant = go2::dds::Participant::join(network.domain, address)?;
+    let join = || go2::dds::Participant::join(network.domain, address);
+    let (participant, witness) = (join()?, join()?);
     let commands = go2::dds::TopicType::low_command().with_reliable(network.reliable_commands);
-    let transport = go2::dds::DdsTransport::open(&participant, &commands, command.bytes())?;
+    let transport = go2::dds::DdsTransport::open(&participant, &witness, &commands, command.bytes())?;
     let robot = go2::link::Go2::new(transport, network);
     let (domain, reliable) = (network.domain, network.reliable_commands);
     let route = DampingRoute::Go2 { command: command.bytes().to_vec(), domain, address, reliable };

@@ -329,6 +329,12 @@ pub trait Robot: Send {
         None
     }
 
+    /// Whether the written commands leave this program, as far as the driver can see. While they do not, the control thread sends the
+    /// guard no heartbeat, so that the guard damps the robot on its own way to it.
+    fn delivers(&self) -> bool {
+        true
+    }
+
     /// Begins to call a robot that sends nothing until it is commanded, for at most [`CONTACT_S`] and until the first command. A robot
     /// that answers by itself ignores it.
     fn begin_contact(&mut self) {}
@@ -350,6 +356,9 @@ impl<R: Robot + ?Sized> Robot for Box<R> {
     }
     fn link(&self) -> Option<LinkStatus> {
         (**self).link()
+    }
+    fn delivers(&self) -> bool {
+        (**self).delivers()
     }
     fn begin_contact(&mut self) {
         (**self).begin_contact();

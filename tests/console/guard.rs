@@ -16,9 +16,13 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use portable_pty::CommandBuilder;
 use quadfrog::config::Config;
+use quadfrog::engine::Guard;
+use quadfrog::robot::description::RobotFiles;
 use quadfrog::robot::go1::convert::{low_cmd, low_state};
 use quadfrog::robot::go1::packet::CrcForm;
+use quadfrog::robot::hardware::DampingRoute;
 use quadfrog::robot::{JOINTS, JointCommand, RobotState};
+use quadfrog::trial::{Backend, Task};
 use tempfile::TempDir;
 
 /// Time without a datagram after which the sender counts as ended.
@@ -266,6 +270,23 @@ fn a_stopped_guard_is_reported_and_so_is_its_return() {
     session.wait_for(&["the guard process answers again"]);
     session.signal(Signal::SIGTERM);
     assert!(session.wait().success());
+}
+
+/// Regression: the guard was killed at once, also where the robot was left to it because the commands did not reach it.
+#[test]
+fn a_robot_that_is_left_to_the_guard_is_damped_before_the_guard_ends() {
+    let robot = RecordingRobot::start();
+    let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    socket.connect(robot.address).unwrap();
+    let route = (DampingRoute::Go1 { command: damping() }, Some(socket));
+    let description = RobotFiles::embedded("go1").unwrap().description().unwrap();
+    let settings = Config::load(None).unwrap().settings(&description, Task::Forward, Backend::Hardware).unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_quadfrog"));
+    let (guard, mut heartbeat) = Guard::start(program, route, &settings).unwrap();
+    heartbeat.count_tick(true);
+    heartbeat.leave_robot();
+    guard.end();
+    assert_damped(&robot.rest(0));
 }
 
 /// Runs the guard alone with this input and this socket.

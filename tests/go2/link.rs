@@ -21,6 +21,8 @@ struct Wire {
     counts: TransportCounts,
     /// Commands are handed over and never reach the network.
     stuck: bool,
+    /// Commands on the network come back.
+    returns: bool,
 }
 
 impl Transport for InMemory {
@@ -35,6 +37,7 @@ impl Transport for InMemory {
         if !wire.stuck {
             wire.commands.push(payload.to_vec());
             wire.counts.sent += 1;
+            wire.counts.returned += u64::from(wire.returns);
         }
     }
     fn counts(&self) -> TransportCounts {
@@ -137,6 +140,25 @@ fn commands_that_do_not_reach_the_network_are_an_error() {
         let _ = robot.read();
     }
     tick(&mut robot).unwrap();
+}
+
+/// Regression: a library that drops what the system refuses to send counts it as sent, and there was no error.
+#[test]
+fn commands_that_no_longer_come_back_are_an_error() {
+    let (mut robot, wire) = robot();
+    let damping = JointCommand::damping(3.0);
+    (0..100).for_each(|_| robot.write(&damping).unwrap());
+    assert!(robot.delivers(), "where none ever came back, those that were sent count");
+    wire.0.lock().unwrap().returns = true;
+    (0..100).for_each(|_| robot.write(&damping).unwrap());
+    wire.0.lock().unwrap().returns = false;
+    let until = (0..1000).position(|_| robot.write(&damping).is_err());
+    assert!(until.is_some_and(|ms| (15..=25).contains(&ms)), "{until:?}");
+    assert!(!robot.delivers());
+    wire.0.lock().unwrap().returns = true;
+    let _ = robot.write(&damping);
+    robot.write(&damping).unwrap();
+    assert!(robot.delivers());
 }
 
 /// The same rule as the Go1's: a motor has time to enter servo mode, and again after a restart.

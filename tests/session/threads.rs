@@ -1,5 +1,7 @@
 //! The threads of an engine: the control thread damps the robot at its end, also after a panic, and dropped threads have ended.
 
+use std::io::Read;
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -7,7 +9,7 @@ use std::time::Duration;
 
 use crate::bench::shipped;
 use quadfrog::engine::control_thread::{ControlThreadParts, drive, lead};
-use quadfrog::engine::{EngineThreads, Options};
+use quadfrog::engine::{EngineThreads, GuardHeartbeat, Options};
 use quadfrog::realtime::channel::{SHOWN_EVERY, channels};
 use quadfrog::realtime::clock::{MonotonicClock, SimulatedClock};
 use quadfrog::realtime::scheduling::Scheduling;
@@ -133,6 +135,73 @@ fn only_a_real_robot_has_a_cache_warm_up() {
 fn the_last_word_to_a_robot_that_is_controlled_is_damping_and_to_another_there_is_none() {
     assert_eq!(damped(true, [u32::MAX; 2], 0).1, 500, "an end in order, too");
     assert_eq!(damped(false, [20, u32::MAX], 1), (Vec::new(), 0), "a robot that is only observed");
+}
+
+/// A robot whose commands reach it while `reached` is positive; each write decreases it.
+struct CutOff {
+    reached: u32,
+    sent: u32,
+}
+
+impl Robot for CutOff {
+    fn read(&mut self) -> Result<RobotState, RobotError> {
+        Ok(RobotState::default())
+    }
+    fn write(&mut self, _: &JointCommand) -> Result<(), RobotError> {
+        self.reached = self.reached.saturating_sub(1);
+        self.sent += 1;
+        Ok(())
+    }
+    fn place(&mut self, _: &Placement) -> bool {
+        false
+    }
+    fn delivers(&self) -> bool {
+        self.reached > 0
+    }
+}
+
+/// Returns the heartbeats that a guard receives in 100 ticks of a robot that `reached` commands reach, and the number of commands.
+fn heartbeats(reached: u32) -> (String, u32) {
+    let (_, _, settings) = shipped(Backend::Hardware);
+    let (control, mut session, console, _ticks) = channels();
+    console.heartbeat.beat();
+    session.commands.push(Command::TakeControl).unwrap();
+    let (ours, mut guard) = UnixStream::pair().unwrap();
+    let mut robot = CutOff { reached, sent: 0 };
+    let mut start = ControlThreadParts {
+        settings: &settings,
+        scheduling: Scheduling::default(),
+        report: channel().0,
+        clock: &SimulatedClock,
+        closing: &AtomicBool::new(true),
+        hardware: true,
+        guard_heartbeat: Some(GuardHeartbeat::new(ours).unwrap()),
+    };
+    let unpaced = |ticking: &mut dyn PeriodicTask| {
+        for ms in 0..100 {
+            let _ = ticking.tick(TickStart { planned_ns: ms * 1_000_000, lateness_ns: 0 });
+        }
+        Ok(())
+    };
+    drive(&mut start, control, &mut robot, unpaced, || {}).unwrap();
+    let mut received = String::new();
+    guard.read_to_string(&mut received).unwrap();
+    (received, robot.sent)
+}
+
+/// Regression: where the library of a robot's network failed, the guard received heartbeats, and at the end that the robot was left
+/// alone: the robot held its last torques.
+#[test]
+fn a_robot_that_commands_do_not_reach_is_left_to_the_guard() {
+    let (received, sent) = heartbeats(u32::MAX);
+    assert!(received.starts_with('+') && received.ends_with("+-") && received.len() > 50, "{received}");
+    assert!(sent >= 500, "{sent}");
+    // It fails after 45 ticks: no heartbeat from then on, and no last one; damping is tried all the same.
+    let (received, sent) = heartbeats(45);
+    assert!(received.chars().all(|heartbeat| heartbeat == '+') && (4..=6).contains(&received.len()), "{received}");
+    assert!(sent >= 500, "{sent}");
+    // It never worked: the guard knows of the robot.
+    assert_eq!(heartbeats(0).0, "+");
 }
 
 /// A simulated robot that counts as running until its thread has dropped it.

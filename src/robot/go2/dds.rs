@@ -27,8 +27,10 @@ use super::own_writes::OwnWrites;
 /// Time for which a writer may wait for a reader that does not acknowledge, ms. Below the time after which a command that has
 /// not been sent is a fault.
 const WRITE_BLOCKING_MS: i64 = 10;
-/// Longest wait of a thread until it looks whether it is to end, ms.
+/// Longest wait of the thread that writes until it looks whether it is to end, ms.
 const WAKE_MS: u64 = 50;
+/// Longest wait for a state, ms: commands that came back are counted in time, too, while the robot sends no state.
+const STATE_WAIT_MS: u64 = 2;
 /// States that wait for the tick at most; more are dropped and show as lost.
 const WAITING_STATES: usize = 64;
 /// Samples that a reader keeps until they are taken. The newest is the one that counts, the others are for the count of losses.
@@ -326,10 +328,10 @@ struct WaitingState {
 #[derive(Debug, Default)]
 struct SharedCounts {
     sent: AtomicU64,
+    returned: AtomicU64,
     send_errors: AtomicU64,
     foreign: AtomicU64,
     foreign_commands: AtomicU64,
-    own_writes: OwnWrites,
 }
 
 /// A console's transport: one thread takes states and watches the commands of other programs, one writes the newest command.
@@ -340,8 +342,8 @@ pub struct DdsTransport {
     ending: Arc<AtomicBool>,
     writing: Option<JoinHandle<()>>,
     reading: Option<JoinHandle<()>>,
-    /// Ends after the readers and writers.
-    _participant: Participant,
+    /// End after the readers and writers.
+    _participants: [Participant; 2],
 }
 
 impl std::fmt::Debug for DdsTransport {
@@ -351,19 +353,21 @@ impl std::fmt::Debug for DdsTransport {
 }
 
 impl DdsTransport {
-    /// Opens the topics of states and commands, the latter as `commands` says, and starts the threads; the guard writes
-    /// `guards_command`, which after a silence of this program is no command of another one.
+    /// Opens the topics of states and commands, the latter as `commands` says, and starts the threads. `witness` reads the commands
+    /// of all programs: the library hands no participant its own. The guard writes `guards_command`, which after a silence of this
+    /// program is no command of another one.
     ///
     /// # Errors
     /// A topic cannot be opened, or a thread not started.
     pub fn open(
         participant: &Participant,
+        witness: &Participant,
         commands: &TopicType,
         guards_command: &[u8; COMMAND_LENGTH],
     ) -> Result<DdsTransport, DdsError> {
         let states = participant.reader(&TopicType::low_state())?;
         let writer = participant.writer(commands)?;
-        let others = participant.reader(&TopicType::low_command())?;
+        let all_commands = witness.reader(&TopicType::low_command())?;
         let (state_in, state_out) = rtrb::RingBuffer::new(WAITING_STATES);
         let (command_in, command_out) = triple_buffer::triple_buffer(&[0; COMMAND_LENGTH]);
         let (counts, ending) = (Arc::<SharedCounts>::default(), Arc::<AtomicBool>::default());
@@ -374,14 +378,14 @@ impl DdsTransport {
             ending: ending.clone(),
             writing: None,
             reading: None,
-            _participant: participant.clone(),
+            _participants: [participant.clone(), witness.clone()],
         };
         let failed = |error: std::io::Error| DdsError::Thread { reason: error.to_string() };
         let (shared, flag) = (counts.clone(), ending.clone());
         let write = move || write_commands(&writer, command_out, &shared, &flag);
         transport.writing = Some(std::thread::Builder::new().name("dds-commands".into()).spawn(write).map_err(failed)?);
         let ours = Ours { participant: participant.identity(), guards_command: *guards_command };
-        let read = move || take_samples(states, others, state_in, &ours, &counts, &ending);
+        let read = move || take_samples(states, all_commands, state_in, &ours, &counts, &ending);
         transport.reading = Some(std::thread::Builder::new().name("dds-states".into()).spawn(read).map_err(failed)?);
         Ok(transport)
     }
@@ -403,10 +407,10 @@ impl Transport for DdsTransport {
     }
 
     fn counts(&self) -> TransportCounts {
-        let SharedCounts { sent, send_errors, foreign, foreign_commands, .. } = &*self.counts;
-        let [sent, send_errors, foreign, foreign_commands] =
-            [sent, send_errors, foreign, foreign_commands].map(|count| count.load(Ordering::Relaxed));
-        TransportCounts { sent, send_errors, foreign, foreign_commands }
+        let SharedCounts { sent, returned, send_errors, foreign, foreign_commands } = &*self.counts;
+        let [sent, returned, send_errors, foreign, foreign_commands] =
+            [sent, returned, send_errors, foreign, foreign_commands].map(|count| count.load(Ordering::Relaxed));
+        TransportCounts { sent, returned, send_errors, foreign, foreign_commands }
     }
 }
 
@@ -432,10 +436,7 @@ fn write_commands(
         let ends = ending.load(Ordering::Acquire);
         if newest.update() {
             let count = match writer.write(newest.output_buffer_mut()) {
-                Ok(()) => {
-                    counts.own_writes.note(since_boot_ns());
-                    &counts.sent
-                }
+                Ok(()) => &counts.sent,
                 Err(_) => &counts.send_errors,
             };
             count.fetch_add(1, Ordering::Relaxed);
@@ -459,14 +460,13 @@ struct Ours {
 }
 
 impl Ours {
-    /// Whether a command that is taken now is of another program.
+    /// Whether a command of another participant that is taken now is not one of this program's guard.
     fn is_foreign(&self, sample: &ReceivedSample, own_writes: &OwnWrites) -> bool {
-        let is_guards = || sample.payload[..] == self.guards_command && own_writes.guard_may_speak(since_boot_ns());
-        sample.participant != self.participant && !is_guards()
+        sample.payload[..] != self.guards_command || !own_writes.guard_may_speak(since_boot_ns())
     }
 }
 
-/// Passes states on, and counts the commands of other programs.
+/// Passes states on, and counts the commands of other programs and those of this one that came back.
 fn take_samples(
     mut states: TopicReader,
     mut commands: TopicReader,
@@ -475,8 +475,9 @@ fn take_samples(
     counts: &SharedCounts,
     ending: &AtomicBool,
 ) {
+    let mut own_writes = OwnWrites::default();
     while !ending.load(Ordering::Acquire) {
-        states.wait(Duration::from_millis(WAKE_MS));
+        states.wait(Duration::from_millis(STATE_WAIT_MS));
         while let Some(sample) = states.take() {
             let mut state = WaitingState { length: sample.payload.len(), bytes: [0; STATE_LENGTH] };
             let held = state.length.min(STATE_LENGTH);
@@ -486,7 +487,10 @@ fn take_samples(
         }
         counts.foreign.store(states.foreign, Ordering::Relaxed);
         while let Some(sample) = commands.take() {
-            if ours.is_foreign(&sample, &counts.own_writes) {
+            if sample.participant == ours.participant {
+                counts.returned.fetch_add(1, Ordering::Relaxed);
+                own_writes.note(since_boot_ns());
+            } else if ours.is_foreign(&sample, &own_writes) {
                 counts.foreign_commands.fetch_add(1, Ordering::Relaxed);
             }
         }

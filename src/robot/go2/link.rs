@@ -28,8 +28,10 @@ pub trait Transport: Send + std::fmt::Debug {
 /// Counts of a transport since its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TransportCounts {
-    /// Commands put on the network.
+    /// Commands that the library of the transport took for sending.
     pub sent: u64,
+    /// Commands of this program that a second participant of it received from the network; zero where none ever arrives.
+    pub returned: u64,
     /// Commands that could not be sent.
     pub send_errors: u64,
     /// Messages on the state's topic in another encoding.
@@ -48,9 +50,9 @@ pub struct Go2<T> {
     newest: Option<StateMessage>,
     /// The last command that damps every joint.
     damping: Option<CommandPayload>,
-    /// Whether a command was handed over that is not on the network.
-    waits: bool,
-    /// Time since the last command reached the network while another one waited, ms.
+    /// Commands that had reached the network at the last command; none before the first.
+    reached: Option<u64>,
+    /// Time for which commands have been handed over and none reached the network, ms.
     unsent_ms: u32,
     buffer: [u8; STATE_LENGTH],
 }
@@ -74,7 +76,7 @@ impl<T: Transport> Go2<T> {
             foot_force_n,
             newest: None,
             damping: None,
-            waits: false,
+            reached: None,
             unsent_ms: 0,
             buffer: [0; STATE_LENGTH],
         }
@@ -101,13 +103,19 @@ impl<T: Transport> Go2<T> {
         }
     }
 
-    /// Copies the transport's counts, and counts the time for which a command waits.
-    fn count_sent(&mut self) {
+    /// Counts the time for which the commands before this one have not reached the network, one command a millisecond.
+    fn count_unsent(&mut self) {
+        let TransportCounts { sent, returned, .. } = self.transport.counts();
+        // A library that does not report an error of the system counts the command as sent.
+        let reached = if returned > 0 { returned } else { sent };
+        self.unsent_ms = if self.reached == Some(reached) { self.unsent_ms.saturating_add(1) } else { 0 };
+        self.reached = Some(reached);
+    }
+
+    /// Copies the transport's counts.
+    fn copy_counts(&mut self) {
         let counts = self.transport.counts();
         let status = &mut self.counter.status;
-        let has_sent = counts.sent != status.sent;
-        self.waits &= !has_sent;
-        self.unsent_ms = if self.waits { self.unsent_ms.saturating_add(1) } else { 0 };
         status.sent = counts.sent;
         status.send_errors = counts.send_errors;
         status.foreign = counts.foreign;
@@ -120,7 +128,7 @@ impl<T: Transport> Robot for Go2<T> {
     fn read(&mut self) -> Result<RobotState, RobotError> {
         self.servo.advance();
         self.counter.advance();
-        self.count_sent();
+        self.copy_counts();
         let mut is_new = false;
         for _ in 0..MOST_PER_TICK {
             let Some(length) = self.transport.receive(&mut self.buffer) else { break };
@@ -143,13 +151,13 @@ impl<T: Transport> Robot for Go2<T> {
         if *command == JointCommand::damping(command.motor[0].kd_joint) {
             self.damping = encoded.as_ref().ok().copied().or(self.damping);
         }
-        if let Some(payload) = encoded.as_ref().ok().or(self.damping.as_ref()) {
+        if let Some(payload) = encoded.as_ref().ok().copied().or(self.damping) {
+            self.count_unsent();
             self.transport.send(payload.bytes());
-            self.waits = true;
         }
         encoded.map_err(|_| RobotError::Send { errno: nix::errno::Errno::EINVAL as i32 })?;
         self.servo.command();
-        if self.unsent_ms > UNSENT_MS {
+        if !self.delivers() {
             return Err(RobotError::Send { errno: nix::errno::Errno::ETIMEDOUT as i32 });
         }
         Ok(())
@@ -162,6 +170,10 @@ impl<T: Transport> Robot for Go2<T> {
 
     fn link(&self) -> Option<LinkStatus> {
         Some(self.counter.status)
+    }
+
+    fn delivers(&self) -> bool {
+        self.unsent_ms <= UNSENT_MS
     }
 
     fn warm_up(&mut self) {
