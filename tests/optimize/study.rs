@@ -3,7 +3,7 @@
 use crate::support;
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 use quadfrog::optimize::ask::{Direction, SamplerConfig};
-use quadfrog::optimize::journal::{Durability, Journal, JournalFile, LOCK_GRACE, Operation};
+use quadfrog::optimize::journal::{Durability, Journal, JournalError, JournalFile, LOCK_GRACE, Operation};
 use quadfrog::optimize::space::{Range, Space};
 use quadfrog::optimize::study::{Outcome, Storage, Study, StudyError, StudyOptions, TellOutcome};
 use quadfrog::optimize::trial::{Trial, TrialState, value_of};
@@ -262,6 +262,34 @@ fn a_writer_that_was_stopped_for_longer_than_the_grace_deletes_no_line_of_anothe
         Err::<Vec<Operation>, Failure>("refused".into())
     });
     assert!(refused.is_err() && lock.is_symlink());
+}
+
+/// Regression: each name had its own lock, and two writers wrote at the same time.
+#[test]
+fn writers_that_reach_a_journal_by_several_names_share_its_lock() {
+    let folder = tempdir().unwrap();
+    let place = folder.path().canonicalize().unwrap();
+    let (file, link, link_to_link) = (place.join("study.log"), place.join("link.log"), place.join("again.log"));
+    symlink("study.log", &link).unwrap();
+    symlink(&link, &link_to_link).unwrap();
+    let lock_of = |name: &Path| {
+        let file = JournalFile::new(name, Durability::Buffered, LOCK_GRACE).unwrap();
+        let mut journal = Journal::open(file).unwrap();
+        journal.wait().begin(1);
+        journal.wait().interrupt(1);
+        match journal.commit::<JournalError>(|_| Ok(Vec::new())) {
+            Err(JournalError::Interrupted { lock }) => lock,
+            other => panic!("{other:?}"),
+        }
+    };
+    // Before the journal exists, and after.
+    for _ in 0..2 {
+        for name in [&file, &link, &link_to_link] {
+            assert_eq!(lock_of(name), place.join("study.log.lock"));
+        }
+        open(&link_to_link, 0, true);
+        assert!(file.is_file());
+    }
 }
 
 #[test]

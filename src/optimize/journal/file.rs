@@ -4,7 +4,7 @@ use super::error::JournalError;
 use super::json::is_torn;
 use super::wait::{JournalWait, LongWait, WaitedFor};
 use std::fs::{self, File, OpenOptions};
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -20,6 +20,18 @@ const LONGEST_LINE: usize = 16 << 20;
 
 /// Beginning of an SQLite database (<https://www.sqlite.org/fileformat.html>, "The Database Header").
 const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// Returns the path of a file behind all symbolic links, also of one that does not exist yet: programs that reach a journal by
+/// several names share one lock.
+fn behind_links(path: &Path) -> io::Result<PathBuf> {
+    match fs::canonicalize(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => match fs::read_link(path) {
+            Ok(target) => behind_links(&path.with_file_name(target)),
+            Err(_) => Ok(path.to_owned()),
+        },
+        found => found,
+    }
+}
 
 fn too_long(length: usize) -> String {
     format!("the line has {length} bytes, more than {LONGEST_LINE}")
@@ -65,6 +77,7 @@ impl JournalFile {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| JournalError::io("create the folder of", &path, e))?;
         }
+        let path = behind_links(&path).map_err(|e| JournalError::io("resolve", &path, e))?;
         let mut lock = path.clone().into_os_string();
         lock.push(".lock");
         let wait = JournalWait::default();
