@@ -174,14 +174,50 @@ fn a_server_that_lost_its_data_ends_the_study_with_its_name() {
     let Some((_server, url)) = server() else { return };
     let mut study = open(&url, 0).unwrap();
     run(&mut study);
-    let mut connection = ::redis::Client::open(url.as_str()).unwrap().get_connection().unwrap();
-    ::redis::cmd("FLUSHALL").exec(&mut connection).unwrap();
+    ::redis::cmd("FLUSHALL").exec(&mut by_hand(&url)).unwrap();
     let error = study.refresh().unwrap_err().to_string();
     assert!(error.contains("lost its data") && error.contains("127.0.0.1"), "{error}");
     // Also without a read in between: a worker that only writes.
     let draft = study.draft();
     let error = study.begin(&draft, &[], &[]).unwrap_err().to_string();
     assert!(error.contains("lost its data"), "{error}");
+}
+
+/// A connection to the server for a change of its keys by hand.
+fn by_hand(url: &str) -> ::redis::Connection {
+    ::redis::Client::open(url).unwrap().get_connection().unwrap()
+}
+
+/// Regression: readers showed the lines before it as the whole study, and writers asked again without a pause or an end.
+#[test]
+fn a_missing_line_is_an_error_of_readers_and_writers() {
+    let Some((_server, url)) = server() else { return };
+    let mut behind = open(&url, 0).unwrap();
+    run(&mut open(&url, 1).unwrap());
+    let mut connection = by_hand(&url);
+    let last: u32 = ::redis::cmd("GET").arg(":log_number").query(&mut connection).unwrap();
+    ::redis::cmd("DEL").arg(format!(":log:{last}")).exec(&mut connection).unwrap();
+    let draft = behind.draft();
+    let of_writer = behind.begin(&draft, &[], &[]).unwrap_err().to_string();
+    let of_reader = open(&url, 2).unwrap_err().to_string();
+    for error in [of_reader, of_writer] {
+        let named = format!(":log:{last}, line {}: the line is missing on the server", last + 1);
+        assert!(error.contains(&named), "{error}");
+    }
+}
+
+/// Regression: the lines of a new study were written over the old ones.
+#[test]
+fn lines_whose_number_was_lost_are_not_overwritten() {
+    let Some((_server, url)) = server() else { return };
+    run(&mut open(&url, 0).unwrap());
+    let mut connection = by_hand(&url);
+    let first = ::redis::cmd("GET").arg(":log:0").to_owned();
+    let before: String = first.query(&mut connection).unwrap();
+    ::redis::cmd("DEL").arg(":log_number").exec(&mut connection).unwrap();
+    let error = open(&url, 1).unwrap_err().to_string();
+    assert!(error.contains("127.0.0.1") && error.contains("Set :log_number"), "{error}");
+    assert_eq!(first.query::<String>(&mut connection).unwrap(), before);
 }
 
 /// Accepts connections and never answers.

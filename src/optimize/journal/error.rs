@@ -45,6 +45,12 @@ pub enum JournalError {
          cleared; every trial reported before is gone from the server. Open the study again once the data is restored"
     )]
     RedisShortened { address: String, had: i64, has: i64 },
+    #[error(
+        "the journal on the Redis server {address} has the key {prefix}:log:{index}, and {prefix}:log_number does not count it: \
+         nothing is written, because lines would be overwritten. Set {prefix}:log_number to the number of the last line, counted \
+         from 0, or, for a new study, remove the keys {prefix}:log:*"
+    )]
+    RedisUncounted { address: String, prefix: String, index: i64 },
     #[error("{address} is not an address of a Redis server ({fault}); write it as redis://HOST:PORT/DB")]
     RedisAddress { address: String, fault: String },
     #[error("the wait for the Redis server {address} was ended; it is not known whether the last lines were written")]

@@ -22,6 +22,12 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time without a connection after the first one: a server that restarts and loads its data takes less.
 const RECONNECT_TIMEOUT: Duration = Duration::from_secs(120);
 
+/// Longest wait for a line that is counted and not there: another writer on a cluster sets it right after it has counted it.
+const LINE_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// First word of the script's error about lines that are not counted.
+const UNCOUNTED: &str = "UNCOUNTED";
+
 /// Shortest and longest pause between two attempts to connect.
 const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(2)];
 
@@ -29,7 +35,8 @@ const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(2)
 const STEP: Duration = Duration::from_millis(50);
 
 /// Appends ARGV[3..] after line ARGV[2] if that is the last line; P is ARGV[1]. Returns 1 if these lines follow that line, now
-/// or since an earlier request, else 0. Each line names its writer, so that no other writer's line is equal.
+/// or since an earlier request, else 0. Each line names its writer, so that no other writer's line is equal. Where the number of the
+/// last line was lost and the lines are there, it writes nothing and returns the error [`UNCOUNTED`].
 const APPEND: &str = "\
 local number = ARGV[1] .. ':log_number'
 local last = tonumber(redis.call('get', number) or '-1')
@@ -38,6 +45,7 @@ if last ~= tonumber(ARGV[2]) then
   if redis.call('get', ARGV[1] .. ':log:' .. next) == ARGV[3] then return 1 end
   return 0
 end
+if redis.call('exists', ARGV[1] .. ':log:' .. next) == 1 then return redis.error_reply('UNCOUNTED ' .. next) end
 for i = 3, #ARGV do
   last = last + 1
   redis.call('set', ARGV[1] .. ':log:' .. string.format('%d', last), ARGV[i])
@@ -98,10 +106,11 @@ impl JournalRedis {
     }
 
     /// Passes every line appended since the last call to `accept`, which returns the fault of an invalid line. A line that
-    /// is counted but not yet present, as on clusters, is left for the next call.
+    /// is counted but not yet present, as on clusters, is waited for.
     ///
     /// # Errors
-    /// If the server cannot be read, has fewer lines than were read before, or has an invalid line.
+    /// If the server cannot be read, has fewer lines than were read before, or has an invalid line; if a line is missing for
+    /// [`LINE_TIMEOUT`], or the wait for it was ended.
     pub(super) fn read(&mut self, mut accept: impl FnMut(&str) -> Result<(), String>) -> Result<(), JournalError> {
         let number = format!("{}:log_number", self.prefix);
         let last: Option<i64> = self.ask("read", |c| redis::cmd("GET").arg(&number).query(c))?;
@@ -110,20 +119,48 @@ impl JournalRedis {
             let (address, had, has) = (self.address.clone(), self.lines, last + 1);
             return Err(JournalError::RedisShortened { address, had, has });
         }
+        let mut waited: Option<LongWait> = None;
         while self.lines <= last {
             let until = last.min(self.lines + BATCH - 1);
             let keys: Vec<String> = (self.lines..=until).map(|i| format!("{}:log:{i}", self.prefix)).collect();
             let batch: Vec<Option<String>> = self.ask("read", |c| redis::cmd("MGET").arg(&keys).query(c))?;
             for line in batch {
-                let Some(line) = line else { return Ok(()) };
-                accept(line.trim_end()).map_err(|fault| {
-                    let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
-                    JournalError::Line { path, line: self.lines as usize + 1, fault }
-                })?;
+                let Some(line) = line else { break };
+                accept(line.trim_end()).map_err(|fault| self.fault_of_line(fault))?;
                 self.lines += 1;
+                waited = None;
+            }
+            if self.lines <= until {
+                self.await_line(waited.get_or_insert_with(LongWait::begin))?;
             }
         }
         Ok(())
+    }
+
+    /// Waits a moment for the next line, which is counted and not there.
+    fn await_line(&self, waited: &mut LongWait) -> Result<(), JournalError> {
+        if self.wait.is_interrupted() {
+            return Err(JournalError::ServerWaitEnded { address: self.address.clone() });
+        }
+        if waited.elapsed() >= LINE_TIMEOUT {
+            return Err(self.fault_of_line("the line is missing on the server".to_owned()));
+        }
+        waited.announce(|| {
+            format!(
+                "waiting for line {} of the journal on the Redis server {}, for {} s at most; Ctrl-C ends the wait",
+                self.lines + 1,
+                self.address,
+                LINE_TIMEOUT.as_secs()
+            )
+        });
+        std::thread::sleep(STEP);
+        Ok(())
+    }
+
+    /// Returns the error of the next line.
+    fn fault_of_line(&self, fault: String) -> JournalError {
+        let path = format!("{}, key {}:log:{}", self.address, self.prefix, self.lines).into();
+        JournalError::Line { path, line: self.lines as usize + 1, fault }
     }
 
     /// Appends the lines unless another writer has appended since the last read. Returns whether it has appended.
@@ -154,8 +191,11 @@ impl JournalRedis {
                 Ok(answer) => break Ok(answer),
                 Err(error) => error,
             };
-            self.connection = None;
             let address = self.address.clone();
+            if source.code() == Some(UNCOUNTED) {
+                break Err(JournalError::RedisUncounted { address, prefix: self.prefix.clone(), index: self.lines });
+            }
+            self.connection = None;
             if !self.answered || !is_passing(&source) || waited.elapsed() >= RECONNECT_TIMEOUT {
                 break Err(JournalError::Redis { action, address, reason: in_words(&source) });
             }

@@ -49,6 +49,7 @@ impl From<EngineError> for Failure {
                 JournalError::Io { .. }
                 | JournalError::Redis { .. }
                 | JournalError::RedisShortened { .. }
+                | JournalError::RedisUncounted { .. }
                 | JournalError::ServerWaitEnded { .. },
             ))
             | EngineError::Recording(RecordingError::Io { .. }) => Failure::Other(error.into()),
