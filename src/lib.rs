@@ -44,13 +44,14 @@
 //! config     -> everything below but report, session   files to checked values
 //! report     -> recording, optimize, control, telemetry, robot, trial, printable    figures, pages and tables of studies
 //! session    -> optimize, recording, control, sim, realtime, telemetry, trial, robot    proposes, runs and judges trials
-//! recording  -> telemetry, trial, optimize, robot      writes and reads sessions
+//! recording  -> telemetry, trial, optimize, robot, unfinished    writes and reads sessions
 //! control    -> telemetry, realtime, trial, robot      computes the torques of a tick
 //! sim        -> robot                                  simulates the robot
 //! realtime   -> telemetry, robot                       threads, scheduling, clock, channels
 //! telemetry  -> robot, trial                           data across the real-time boundary
 //! optimize, robot, trial -> nothing of ours            samplers and studies | the machine | vocabulary of a trial
 //! printable  -> nothing of ours                        characters that act on a terminal, for report and engine
+//! unfinished -> nothing of ours                        files that a process which a signal ends removes
 //! ```
 //!
 //! `tests/architecture.rs` checks these rules. `docs/architecture.md` explains the structure and how to add a task, a robot, a
@@ -82,3 +83,4 @@ pub mod session;
 pub mod sim;
 pub mod telemetry;
 pub mod trial;
+pub mod unfinished;

@@ -10,19 +10,20 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// Modules of the engine and the modules that each may use, itself always among them.
-const ENGINE: [(&str, &[&str]); 13] = [
+const ENGINE: [(&str, &[&str]); 14] = [
     ("robot", &[]),
     ("optimize", &[]),
     ("trial", &[]),
     ("printable", &[]),
+    ("unfinished", &[]),
     ("telemetry", &["robot", "trial"]),
     ("realtime", &["telemetry", "robot"]),
     ("sim", &["robot"]),
     ("control", &["robot", "trial", "telemetry", "realtime"]),
-    ("recording", &["telemetry", "trial", "robot", "optimize"]),
+    ("recording", &["telemetry", "trial", "robot", "optimize", "unfinished"]),
     ("report", &["recording", "optimize", "control", "telemetry", "robot", "trial", "printable"]),
     ("session", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
-    ("config", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot"]),
+    ("config", &["optimize", "recording", "control", "sim", "realtime", "telemetry", "trial", "robot", "unfinished"]),
     // The engine may use every module.
     ("engine", &[]),
 ];

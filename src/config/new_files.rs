@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::ConfigError;
+use crate::unfinished::Unfinished;
 
 /// Writes files, by their paths in `folder`, and waits for the disk. A new folder appears with all of them or not at all; in a folder
 /// that exists those written so far are removed on an error. Returns their paths.
@@ -31,6 +32,7 @@ pub fn write_new_files<T: AsRef<Path>, U: AsRef<str>>(
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         // Another program may make the same folder at the same time: the first one's stands.
         let part = folder.with_file_name(format!(".{name}.{}.part", std::process::id()));
+        let _unfinished = Unfinished::enter(&part);
         let write = || {
             // A killed program may have left it: in a container each has the same number.
             if part.is_dir() {

@@ -14,6 +14,7 @@ use super::event_index::{self, IndexedEvent};
 use super::output::{Output, with_suffix};
 use super::topic::Topic;
 use crate::trial::counted_are;
+use crate::unfinished::Unfinished;
 
 /// Name of the metadata record of a recovered file that lacks something, and its key for what that is.
 pub(super) const RECOVERED: &str = "recovered";
@@ -81,6 +82,7 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
         TryLockError::WouldBlock => RecordingError::Recovering { path: unfinished.clone() },
         TryLockError::Error(source) => io("lock the file", &unfinished)(source),
     })?;
+    let _unfinished = Unfinished::enter(&unfinished);
     if target.exists() {
         // The first has ended meanwhile, and this is its file.
         return Err(exists());

@@ -75,10 +75,10 @@ pub fn run<R: Robot>(
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(&TrialRecord, &[Tick]),
 ) -> Result<(), RequestRefusal> {
-    run_watched(experiment, rollout, |trial| each(trial.row, trial.ticks))
+    run_watched(experiment, rollout, |trial| each(trial.row, trial.ticks), || false)
 }
 
-/// [`run`] in which `each` also receives the experiment and a warning.
+/// [`run`] in which `each` also receives the experiment and a warning, and which ends after the present trial once `is_stopped`.
 ///
 /// # Errors
 /// As of [`run`].
@@ -86,10 +86,13 @@ pub fn run_watched<R: Robot>(
     experiment: &mut Experiment,
     rollout: &mut Rollout<R>,
     mut each: impl FnMut(JudgedTrial),
+    is_stopped: impl Fn() -> bool,
 ) -> Result<(), RequestRefusal> {
     let mut voids = 0;
     let mut same = SameLimit::default();
     let mut waited: Option<LongWait> = None;
+    // Whether a trial is to have a further rollout.
+    let mut within_trial = false;
     // A session before this one has left it without a verdict.
     if let Some(trial) = experiment.under_review().map(|row| row.trial) {
         let Some(suggested) = experiment.verdict_without_person() else {
@@ -99,6 +102,9 @@ pub fn run_watched<R: Robot>(
         experiment.judge_by_rule(suggested)?;
     }
     loop {
+        if is_stopped() && !within_trial {
+            return Ok(experiment.close()?);
+        }
         let Some(proposal) = experiment.proposal().filter(|_| experiment.stage() == ExperimentStage::Proposed) else {
             // The pending verdict must be reported before this worker waits: the others wait for it.
             experiment.close()?;
@@ -137,6 +143,7 @@ pub fn run_watched<R: Robot>(
         let (end, ticks) = rollout.run(&spec);
         experiment.ended(spec.trial, &end, ticks, ticks.len() as u64);
         let suggested = experiment.row(spec.trial).and_then(|row| row.suggested).unwrap_or(Verdict::Void);
+        within_trial = false;
         match experiment.judge_by_rule(suggested) {
             Err(RequestRefusal::EndedElsewhere(_)) => continue,
             judged => judged?,
@@ -145,6 +152,7 @@ pub fn run_watched<R: Robot>(
         voids = if suggested == Verdict::Void { voids + 1 } else { 0 };
         let repeated = same.count(limit_key(&end, &settings));
         if let Some(row) = experiment.row(spec.trial) {
+            within_trial = row.verdict.is_none();
             let cause = same.explain(&row.cause);
             let warning = repeated.filter(|_| suggested != Verdict::Void).map(|count| {
                 format!("{count} trials in a row ended by the same limit, the last because: {cause}. Change the limit, or the bounds in optimize.toml")

@@ -32,6 +32,7 @@ mod go2_takeover;
 mod graphics;
 mod guard;
 mod health_view;
+mod interrupts;
 mod judged_by;
 mod judging;
 mod kept_overrides;

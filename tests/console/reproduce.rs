@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::Instant;
 
+use crate::program::ending_signals;
 use nix::sys::signal::{Signal, kill};
 use nix::sys::stat::Mode;
 use nix::unistd::{Pid, mkfifo};
@@ -215,9 +216,7 @@ fn tables_of_a_checkout_need_every_experiment_and_are_written_between_their_mark
 
 #[test]
 fn a_signal_ends_at_once_and_says_what_is_kept() {
-    for signal in [Signal::SIGINT, Signal::SIGTERM] {
-        end_by(signal);
-    }
+    ending_signals().into_iter().for_each(end_by);
 }
 
 fn end_by(signal: Signal) {
@@ -250,7 +249,7 @@ fn an_interrupt_leaves_complete_results_alone() {
         command.args(["reproduce", "--output"]).arg(folder.path()).args(arguments);
         let mut child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
         std::thread::sleep(whole.mul_f64(share));
-        kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
+        kill(Pid::from_raw(child.id() as i32), Signal::SIGTERM).unwrap();
         let message = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
         child.wait().unwrap();
         assert!(fs::read(&complete).unwrap() == before, "{message}");

@@ -12,8 +12,9 @@ use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::robot::{JointCommand, Placement, Robot, RobotError, RobotState};
+use quadfrog::session::automatic::{self, JudgedTrial};
+use quadfrog::session::objective;
 use quadfrog::session::rollout::Rollout;
-use quadfrog::session::{automatic, objective};
 use quadfrog::sim::Simulator;
 use quadfrog::telemetry::{CommanderSign, FallCause, Fault, SensorCheck, TrialEnd, TrialInhibit, TrialSpec};
 use quadfrog::trial::{Backend, JumpParameters, Task, TrialRecord, Verdict};
@@ -354,11 +355,11 @@ fn ten_falls_in_a_row_by_the_same_limit_warn_with_its_key_and_the_study_goes_on(
     let options = Options { trials: Some(21), ..Options::new(config, robot, Backend::Simulator, Task::Forward) };
     let mut experiment = open_experiment(&options, Durability::Buffered, "").unwrap();
     let mut warnings = Vec::new();
-    automatic::run_watched(&mut experiment, &mut rollout, |trial| {
+    let each = |trial: JudgedTrial| {
         assert_eq!(trial.row.verdict, Some(Verdict::Fall), "{}", trial.row.cause);
         warnings.extend(trial.warning.map(|warning| (trial.row.trial, warning.to_owned())));
-    })
-    .unwrap();
+    };
+    automatic::run_watched(&mut experiment, &mut rollout, each, || false).unwrap();
     assert_eq!(experiment.counted(), 21);
     assert_eq!(warnings.iter().map(|(trial, _)| *trial).collect::<Vec<_>>(), [9, 19]);
     for part in ["10 trials in a row", "pitch", "fall.pitch_rad = 0.05 in safety.toml"] {

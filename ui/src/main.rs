@@ -1,6 +1,7 @@
 //! The program `quadfrog`.
 //!
-//! Exit status: 0 when done, 2 for unusable input (the message names it and the remedy), 1 for every other error.
+//! Exit status: 0 when done, 2 for unusable input (the message names it and the remedy), 1 for every other error, 128
+//! and the number of a signal that has ended a command without a screen.
 #![warn(clippy::print_stdout, clippy::print_stderr)] // every text crosses the border of `output`
 
 use std::process::ExitCode;
@@ -23,10 +24,7 @@ fn main() -> ExitCode {
     });
     let Err(failure) = done else { return ExitCode::SUCCESS };
     failure.print();
-    match failure {
-        Failure::Input(_) => ExitCode::from(2),
-        Failure::Other(_) => ExitCode::FAILURE,
-    }
+    ExitCode::from(failure.status())
 }
 
 /// Prints an error of the command line without what its arguments may hold; help and version as they are.

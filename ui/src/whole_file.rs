@@ -4,6 +4,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter};
 use std::path::Path;
 
+use quadfrog::unfinished::Unfinished;
+
 /// Writes a file under another name beside its place, after links, until it is complete, so that an error leaves what was there. A
 /// device or a pipe is written in place.
 ///
@@ -17,6 +19,7 @@ pub fn write_whole(file: &Path, write: impl FnOnce(&mut BufWriter<File>) -> io::
     }
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let part = file.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let _unfinished = Unfinished::enter(&part);
     let written = File::create(&part)
         .and_then(|part| whole(part, write))
         .and_then(|part| part.sync_all())

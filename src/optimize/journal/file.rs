@@ -7,6 +7,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Age at which a lock without a change of the journal counts as stale; the value of Optuna.
@@ -147,7 +148,8 @@ impl JournalFile {
         &self.wait
     }
 
-    /// Acquires the lock, waiting for other writers; a stale lock is broken.
+    /// Acquires the lock, waiting for other writers; a stale lock is broken. The wait can be interrupted by a signal, because
+    /// [`stop_locking`] finds no lock during it.
     ///
     /// # Errors
     /// [`JournalError::Interrupted`] after [`JournalWait::interrupt`].
@@ -165,15 +167,17 @@ impl JournalFile {
             if self.wait.is_interrupted() {
                 return Err(JournalError::Interrupted { lock: self.lock.clone() });
             }
+            let holder = LOCK_HOLDERS.read().unwrap_or_else(PoisonError::into_inner);
             // A symbolic link to the journal, as Optuna's default lock.
             match std::os::unix::fs::symlink(&self.path, &self.lock) {
                 Ok(()) => match LinkIdentity::of(&self.lock) {
-                    Some(identity) => return Ok(JournalLock { path: self.lock.clone(), identity }),
+                    Some(identity) => return Ok(JournalLock { path: self.lock.clone(), identity, _holder: holder }),
                     None => continue,
                 },
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(JournalError::io("lock", &self.lock, e)),
             }
+            drop(holder);
             // Stale: held for the grace time without a change of the journal.
             let changed = fs::metadata(&self.path).and_then(|m| m.modified()).ok();
             match seen {
@@ -271,6 +275,28 @@ impl LinkIdentity {
 pub(super) struct JournalLock {
     path: PathBuf,
     identity: LinkIdentity,
+    _holder: RwLockReadGuard<'static, ()>,
+}
+
+/// Locked for reading by each thread of this process that holds the lock of a journal.
+static LOCK_HOLDERS: RwLock<()> = RwLock::new(());
+
+/// Longest pause between two looks for threads that hold a lock.
+const HOLDER_PAUSE: Duration = Duration::from_millis(1);
+
+/// Waits until this process holds no lock of a journal, for `longest` at most; as long as the result lives it acquires none. For a
+/// process that is to end at once: a lock that stays delays every other program by [`LOCK_GRACE`]. None if a lock is held longer.
+pub fn stop_locking(longest: Duration) -> Option<impl Sized> {
+    let begin = Instant::now();
+    loop {
+        // Not `write`: a thread that holds one lock and acquires another would then wait for this one.
+        match LOCK_HOLDERS.try_write() {
+            Ok(held) => return Some(held),
+            Err(TryLockError::Poisoned(held)) => return Some(held.into_inner()),
+            Err(TryLockError::WouldBlock) if begin.elapsed() >= longest => return None,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(HOLDER_PAUSE),
+        }
+    }
 }
 
 impl JournalLock {

@@ -17,7 +17,7 @@ pub(super) use self::redis::{JournalRedis, public_address};
 pub use codec::JournalLine;
 pub use error::JournalError;
 use file::UnreadTail;
-pub use file::{Durability, JournalFile, LOCK_GRACE};
+pub use file::{Durability, JournalFile, LOCK_GRACE, stop_locking};
 pub use json::TimeForm;
 pub(super) use json::moment;
 pub use operation::{AttributeKind, Operation};

@@ -7,6 +7,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use nix::sys::signal::Signal;
 use serde_json::Value;
 
 /// The folder in which the program runs.
@@ -96,6 +97,16 @@ impl Program {
         let [study] = self.studies(below).try_into().expect("one study");
         study
     }
+}
+
+/// The signals that end a command, but those that this process, and so every program of its own, ignores: a shell lets the programs
+/// in its background ignore SIGINT.
+pub fn ending_signals() -> Vec<Signal> {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
+    let ignored = u64::from_str_radix(ignored.trim(), 16).unwrap();
+    let ending = [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP].into_iter();
+    ending.filter(|signal| ignored & (1 << (*signal as i32 - 1)) == 0).collect()
 }
 
 /// Holds the lock of a study, as a running session does.

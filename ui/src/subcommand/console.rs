@@ -29,9 +29,9 @@ use quadfrog::trial::{Approval, Backend, Task};
 use super::arguments::{self, DEFAULT_MODEL, DdsArguments, RealRobot, StudyArguments, one_of, whole_number};
 use super::completion;
 use super::failure::Failure;
+use super::interrupt::{exit_status, on_signal};
 use super::live;
 use super::selection::{SelectedStudy, study_to_continue};
-use super::signals::{exit_by, on_signal};
 
 fn colour() -> impl TypedValueParser<Value = ColourChoice> {
     one_of([
@@ -286,15 +286,16 @@ impl Takeover {
     /// Begins to take signals.
     fn watch_signals(self: &Arc<Takeover>) -> Result<(), Failure> {
         let takeover = self.clone();
-        on_signal(move |signal| {
+        let act = move |signal| {
             takeover.interrupted.store(true, Ordering::Release);
             if let TakeoverPhase::Starting(way_back) = &*takeover.phase() {
                 if let Some(text) = way_back {
                     put_line!("{text}");
                 }
-                exit_by(signal);
+                std::process::exit(exit_status(signal).into());
             }
-        })
+        };
+        on_signal(act).map_err(|error| Failure::Other(anyhow!("signals cannot be received: {error}")))
     }
 
     fn phase(&self) -> MutexGuard<'_, TakeoverPhase> {

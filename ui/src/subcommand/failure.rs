@@ -5,11 +5,14 @@ use std::path::Path;
 
 use crate::notice;
 use anyhow::anyhow;
+use nix::sys::signal::Signal;
 use quadfrog::config::ConfigError;
 use quadfrog::engine::EngineError;
 use quadfrog::optimize::journal::JournalError;
 use quadfrog::optimize::study::StudyError;
 use quadfrog::recording::RecordingError;
+
+use super::interrupt::exit_status;
 
 /// The reason for which a command ends before it is done.
 pub enum Failure {
@@ -17,6 +20,8 @@ pub enum Failure {
     Input(String),
     /// Every other error; exit status 1.
     Other(anyhow::Error),
+    /// A signal has ended the command after its work was put in order; exit status 128 and the signal's number.
+    Interrupted(Signal),
 }
 
 impl Failure {
@@ -25,11 +30,22 @@ impl Failure {
         Failure::Input(message.to_string())
     }
 
+    /// Returns the exit status of the program.
+    pub fn status(&self) -> u8 {
+        match self {
+            Failure::Input(_) => 2,
+            Failure::Other(_) => 1,
+            Failure::Interrupted(signal) => exit_status(*signal),
+        }
+    }
+
     /// Prints the message on standard error.
     pub fn print(&self) {
         match self {
             Failure::Input(message) => notice!("{message}"),
             Failure::Other(error) => notice!("{}", with_causes(error)),
+            // Printed when the signal came.
+            Failure::Interrupted(_) => {}
         }
     }
 }

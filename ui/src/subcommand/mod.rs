@@ -16,6 +16,7 @@ mod failure;
 mod give_back;
 mod guard;
 mod init;
+mod interrupt;
 mod live;
 mod man;
 mod optimize;
@@ -29,7 +30,6 @@ mod report;
 mod reproduce;
 mod screenshot;
 mod selection;
-mod signals;
 mod study;
 mod table;
 mod verify;
@@ -111,6 +111,14 @@ enum Subcommands {
     Report(report::ReportArguments),
 }
 
+impl Subcommands {
+    /// Whether a signal ends it by [`interrupt`]: the others have a screen, drive a robot, or outlive the signals.
+    fn ends_by_signal(&self) -> bool {
+        use Subcommands::{Attach, Emulate, GiveBack, Guard, Replay};
+        !matches!(self, Attach(_) | Emulate(_) | GiveBack(_) | Guard | Replay(_))
+    }
+}
+
 impl Arguments {
     /// Parses the command line of the process.
     ///
@@ -139,6 +147,9 @@ fn take_negative_numbers(command: Command) -> Command {
 pub fn run(arguments: Arguments) -> Result<(), Failure> {
     // While the console has the screen it shows the waits there.
     notice_waits(Some(Box::new(output::notice)));
+    if arguments.command.as_ref().is_some_and(Subcommands::ends_by_signal) {
+        interrupt::handle_signals();
+    }
     match arguments.command {
         None => console::run(&arguments.console),
         Some(Subcommands::Optimize(optimize)) => optimize::run(&optimize),

@@ -15,6 +15,7 @@ use quadfrog::robot::go1::packet::{COMMAND_LENGTH, STATE_LENGTH};
 
 use crate::put_line;
 use crate::subcommand::failure::Failure;
+use crate::subcommand::interrupt::output_of;
 
 /// The control period.
 pub const PERIOD: Duration = Duration::from_millis(1);
@@ -132,8 +133,7 @@ pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations)
     if let Some(core) = scheduling.core {
         program.arg(format!("--affinity={core}"));
     }
-    let output = program
-        .output()
+    let output = output_of(&mut program)
         .map_err(|error| Failure::input(format!("cyclictest: {error}; install it: apt-get install rt-tests")))?;
     let text = String::from_utf8_lossy(&output.stdout);
     if !output.status.success() {

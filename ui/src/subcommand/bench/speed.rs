@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Output};
 use std::time::Instant;
 
 use crate::put_line;
@@ -13,7 +13,9 @@ use quadfrog::sim::bench::{BenchScene, BlockTimes, SimulatorBench};
 use super::machine;
 use crate::subcommand::arguments::number_within;
 use crate::subcommand::failure::Failure;
+use crate::subcommand::interrupt::output_of;
 use quadfrog::session::parallel::cores;
+use quadfrog::unfinished::Unfinished;
 
 /// Durations of a measurement, s: the least one holds some thousand steps on a slow machine.
 const SECONDS: RangeInclusive<f64> = 0.1..=600.0;
@@ -67,10 +69,11 @@ pub fn run(arguments: &SpeedArguments) -> Result<(), Failure> {
 fn studies(arguments: &[&str]) -> Result<f64, Failure> {
     let program = std::env::current_exe().context("the path of this program")?;
     let folder = std::env::temp_dir().join(format!("quadfrog-bench-{}", std::process::id()));
+    let _unfinished = Unfinished::enter(&folder);
     let start = Instant::now();
     let mut optimize = Command::new(program);
     optimize.arg("optimize").args(arguments).arg("--output").arg(&folder);
-    let output = optimize.stdin(Stdio::null()).output().context("optimize could not be started")?;
+    let output = output_of(&mut optimize).context("optimize could not be started")?;
     let seconds = start.elapsed().as_secs_f64();
     // A leftover in the temporary directory is harmless.
     let _ = std::fs::remove_dir_all(&folder);
@@ -79,7 +82,7 @@ fn studies(arguments: &[&str]) -> Result<f64, Failure> {
 
 /// Returns MuJoCo's steps per second, measured by the script.
 fn mujoco(script: &Path, seconds: f64) -> Result<f64, Failure> {
-    let output = Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()).output();
+    let output = output_of(Command::new("python3").arg(script).arg("bench").arg(seconds.to_string()));
     let output = output.context("python3 could not be started")?;
     let name = script.display();
     if !output.status.success() {

@@ -2,6 +2,7 @@
 
 mod printer;
 mod recorder;
+mod stop;
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -25,6 +26,7 @@ use quadfrog::trial::{Approval, Backend, Task, Verdict};
 
 use printer::Printer;
 use recorder::{RecordedRollout, StudyRecorder};
+use stop::StudiesStop;
 
 use super::arguments::{self, Seeds, StudyArguments, each_once, parse_seeds, whole_number};
 use super::failure::Failure;
@@ -96,16 +98,25 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     let priors = priors(arguments, existing, &config, &robot, &studies)?;
     let budgets = studies.iter().map(|study| arguments.study.trials.or(study.budget).unwrap_or(config.optimize.trials));
     let printer = Printer::new(arguments.json, joined.is_some(), &config, &budgets.collect::<Vec<_>>(), continued);
+    let stop = StudiesStop::at_signal(printer.printer_of_notices());
     let failures = Mutex::new(Vec::new());
     let next = AtomicUsize::new(0);
     let cores = if joined.is_some() { 1 } else { parallel::cores() };
     let jobs = arguments.jobs.map_or(cores, usize::from);
     let fail = |failure| failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
+    let runner = StudyRunner {
+        arguments,
+        join: joined.as_ref(),
+        config: &config,
+        robot: &robot,
+        printer: &printer,
+        stop: &stop,
+    };
     let work = || {
-        while let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed)) {
-            if let Err(failure) =
-                run_one(arguments, joined.as_ref(), &config, &robot, study, priors.get(&study.task), &printer)
-            {
+        while stop.signal().is_none()
+            && let Some(study) = studies.get(next.fetch_add(1, Ordering::Relaxed))
+        {
+            if let Err(failure) = runner.run(study, priors.get(&study.task)) {
                 fail(failure);
             }
         }
@@ -126,6 +137,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
     drop(printer);
     // All failures are printed. The last one decides the exit status, so other errors come after unusable input.
     failures.sort_by_key(|failure| matches!(failure, Failure::Other(_)));
+    failures.extend(stop.signal().map(Failure::Interrupted));
     let last = failures.pop();
     failures.iter().for_each(Failure::print);
     last.map_or(Ok(()), Err)
@@ -194,107 +206,121 @@ fn priors(
     Ok(priors)
 }
 
-fn run_one(
-    arguments: &OptimizeArguments,
-    join: Option<&Storage>,
-    config: &Config,
-    robot: &RobotDescription,
-    study: &SelectedStudy,
-    prior: Option<&ReadyPrior>,
-    printer: &Printer,
-) -> Result<(), Failure> {
-    let settings = config.settings(robot, study.task, Backend::Simulator)?;
-    let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
-    let mut rollout = Rollout::new(simulator, &settings);
-    let study = &study.with_folder()?;
-    let options = Options {
-        seed: study.seed,
-        trials: arguments.study.trials.or(study.budget),
-        folder: Some(study.folder.clone()),
-        study: study.name.clone(),
-        approve: Approval::Auto,
-        join: join.cloned(),
-        accept_backend_change: arguments.accept_backend_change,
-        prior: prior.map(|prior| Arc::clone(&prior.model)),
-        provenance: arguments.study.provenance(),
-        ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
-    };
-    let prepared = engine::prepare_folder(&options)?;
-    if let Some(prior) = prior {
-        prior.keep(&[study.folder.join(PRIOR_FILE)])?;
-    }
-    let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
-    // Workers of a shared study have their own folders: the file name alone is ambiguous.
-    let name = |path: &PathBuf| {
-        if join.is_some() { Some(path.clone().into()) } else { path.file_name().map(ToOwned::to_owned) }
-    };
-    let name = recording.as_ref().and_then(name).unwrap_or_default();
-    // Synced: a judged trial is on disk before the next one is proposed.
-    let mut experiment = engine::open_experiment(&options, Durability::Synced, &name.to_string_lossy())?;
-    printer.opened();
-    let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
-    let (mut failed, mut spare) = (None, Vec::new());
-    // The rollouts of the best trial, and the earlier ones of the present trial.
-    let mut best: Option<(u32, f64, Vec<RecordedRollout>)> = None;
-    let mut present = Vec::new();
-    // The records of the newest verdict, with which a recording of one trial ends.
-    let mut newest = Vec::new();
-    let ran = automatic::run_watched(&mut experiment, &mut rollout, |trial| {
-        let JudgedTrial { experiment, row, warning, .. } = trial;
-        if row.verdict.is_some() {
-            printer.trial(study, row, experiment.counted());
-        }
-        if let Some(warning) = warning {
-            printer.warn(study, warning);
-        }
-        match arguments.record {
-            RecordChoice::None => {}
-            RecordChoice::All => {
-                let rollout = RecordedRollout::of(trial, std::mem::take(&mut spare));
-                if let Some(Err(error)) = recorder.as_mut().map(|recorder| recorder.rollout(&rollout)) {
-                    failed.get_or_insert(error);
-                }
-                spare = rollout.into_ticks();
-            }
-            RecordChoice::Best => match row.verdict {
-                None => present.push(RecordedRollout::of(trial, Vec::new())),
-                Some(verdict) => {
-                    newest = trial.after.to_vec();
-                    let mut rollouts = std::mem::take(&mut present);
-                    let value = row.value.filter(|_| verdict == Verdict::Accept);
-                    if let Some(value) = value.filter(|value| best.as_ref().is_none_or(|(_, best, _)| value > best)) {
-                        let replaced = best.take().and_then(|(_, _, mut rollouts)| rollouts.pop());
-                        let spare = replaced.map(RecordedRollout::into_ticks).unwrap_or_default();
-                        rollouts.push(RecordedRollout::of(trial, spare));
-                        best = Some((row.trial, value, rollouts));
-                    }
-                }
-            },
-        }
-    });
-    if let Some(mut recorder) = recorder {
-        let recorded = match (failed, &best) {
-            (Some(error), _) => Err(error),
-            (None, Some((trial, _, rollouts))) => {
-                let earlier = experiment.rows().filter(|row| row.trial < *trial);
-                recorder.rows(earlier).and_then(|()| rollouts.iter().try_for_each(|rollout| recorder.rollout(rollout)))
-            }
-            (None, None) => Ok(()),
+/// All that the studies have in common.
+struct StudyRunner<'a> {
+    arguments: &'a OptimizeArguments,
+    join: Option<&'a Storage>,
+    config: &'a Config,
+    robot: &'a RobotDescription,
+    printer: &'a Printer,
+    stop: &'a StudiesStop,
+}
+
+impl StudyRunner<'_> {
+    /// Runs a study to its end, or until the stop is set.
+    fn run(&self, study: &SelectedStudy, prior: Option<&ReadyPrior>) -> Result<(), Failure> {
+        let StudyRunner { arguments, join, config, robot, printer, stop } = *self;
+        let settings = config.settings(robot, study.task, Backend::Simulator)?;
+        let simulator = Simulator::new(robot, &config.simulator).map_err(EngineError::from)?;
+        let mut rollout = Rollout::new(simulator, &settings);
+        let study = &study.with_folder()?;
+        let options = Options {
+            seed: study.seed,
+            trials: arguments.study.trials.or(study.budget),
+            folder: Some(study.folder.clone()),
+            study: study.name.clone(),
+            approve: Approval::Auto,
+            join: join.cloned(),
+            accept_backend_change: arguments.accept_backend_change,
+            prior: prior.map(|prior| Arc::clone(&prior.model)),
+            provenance: arguments.study.provenance(),
+            ..Options::new(config.clone(), robot.clone(), Backend::Simulator, study.task)
         };
-        newest.extend(experiment.take_records());
-        failed = recorded.and_then(|()| recorder.finish(&newest, experiment.rows())).err();
+        let prepared = engine::prepare_folder(&options)?;
+        if let Some(prior) = prior {
+            prior.keep(&[study.folder.join(PRIOR_FILE)])?;
+        }
+        let recording = prepared.recording.clone().filter(|_| arguments.record != RecordChoice::None);
+        // Workers of a shared study have their own folders: the file name alone is ambiguous.
+        let name = |path: &PathBuf| {
+            if join.is_some() { Some(path.clone().into()) } else { path.file_name().map(ToOwned::to_owned) }
+        };
+        let name = recording.as_ref().and_then(name).unwrap_or_default();
+        // Synced: a judged trial is on disk before the next one is proposed.
+        let mut experiment = engine::open_experiment(&options, Durability::Synced, &name.to_string_lossy())?;
+        let _running = stop.enter(experiment.journal_wait());
+        printer.opened();
+        let mut recorder = recording.as_ref().map(|path| StudyRecorder::create(path, &options)).transpose()?;
+        let (mut failed, mut spare) = (None, Vec::new());
+        // The rollouts of the best trial, and the earlier ones of the present trial.
+        let mut best: Option<(u32, f64, Vec<RecordedRollout>)> = None;
+        let mut present = Vec::new();
+        // The records of the newest verdict, with which a recording of one trial ends.
+        let mut newest = Vec::new();
+        let each = |trial: JudgedTrial| {
+            let JudgedTrial { experiment, row, warning, .. } = trial;
+            if row.verdict.is_some() {
+                printer.trial(study, row, experiment.counted());
+            }
+            if let Some(warning) = warning {
+                printer.warn(study, warning);
+            }
+            match arguments.record {
+                RecordChoice::None => {}
+                RecordChoice::All => {
+                    let rollout = RecordedRollout::of(trial, std::mem::take(&mut spare));
+                    if let Some(Err(error)) = recorder.as_mut().map(|recorder| recorder.rollout(&rollout)) {
+                        failed.get_or_insert(error);
+                    }
+                    spare = rollout.into_ticks();
+                }
+                RecordChoice::Best => match row.verdict {
+                    None => present.push(RecordedRollout::of(trial, Vec::new())),
+                    Some(verdict) => {
+                        newest = trial.after.to_vec();
+                        let mut rollouts = std::mem::take(&mut present);
+                        let value = row.value.filter(|_| verdict == Verdict::Accept);
+                        if let Some(value) = value.filter(|value| best.as_ref().is_none_or(|(_, best, _)| value > best))
+                        {
+                            let replaced = best.take().and_then(|(_, _, mut rollouts)| rollouts.pop());
+                            let spare = replaced.map(RecordedRollout::into_ticks).unwrap_or_default();
+                            rollouts.push(RecordedRollout::of(trial, spare));
+                            best = Some((row.trial, value, rollouts));
+                        }
+                    }
+                },
+            }
+        };
+        let ran = automatic::run_watched(&mut experiment, &mut rollout, each, || stop.signal().is_some());
+        if let Some(mut recorder) = recorder {
+            let recorded = match (failed, &best) {
+                (Some(error), _) => Err(error),
+                (None, Some((trial, _, rollouts))) => {
+                    let earlier = experiment.rows().filter(|row| row.trial < *trial);
+                    recorder
+                        .rows(earlier)
+                        .and_then(|()| rollouts.iter().try_for_each(|rollout| recorder.rollout(rollout)))
+                }
+                (None, None) => Ok(()),
+            };
+            newest.extend(experiment.take_records());
+            failed = recorded.and_then(|()| recorder.finish(&newest, experiment.rows())).err();
+        }
+        // A full disk fails the journal and the recording: the journal, with every verdict, is named first.
+        if let Err(refusal) = ran {
+            let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
+            let recording =
+                failed.map_or_else(String::new, |error| format!("; and the recording is not complete: {error}"));
+            return Err(Failure::Other(anyhow!("{place}: {refusal}{recording}")));
+        }
+        // Also a finished file that another program put in its place: what was judged is there, the recording is not complete.
+        if let Some(error) = failed {
+            return Err(Failure::Other(anyhow!("the recording is not complete: {error}")));
+        }
+        match stop.signal() {
+            Some(_) if experiment.proposal().is_some() => printer.interrupted(study, experiment.counted(), &options),
+            _ => printer.finished(study, &experiment, &options),
+        }
+        Ok(())
     }
-    // A full disk fails the journal and the recording: the journal, with every verdict, is named first.
-    if let Err(refusal) = ran {
-        let place = join.map_or_else(|| study.folder.display().to_string(), ToString::to_string);
-        let recording =
-            failed.map_or_else(String::new, |error| format!("; and the recording is not complete: {error}"));
-        return Err(Failure::Other(anyhow!("{place}: {refusal}{recording}")));
-    }
-    // Also a finished file that another program put in its place: what was judged is there, the recording is not complete.
-    if let Some(error) = failed {
-        return Err(Failure::Other(anyhow!("the recording is not complete: {error}")));
-    }
-    printer.finished(study, &experiment, &options);
-    Ok(())
 }

@@ -9,7 +9,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::Options;
 use quadfrog::report::table;
 use quadfrog::session::experiment::Experiment;
-use quadfrog::trial::{MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
+use quadfrog::trial::{self, MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
 use serde::{Serialize, Serializer};
 
 use crate::output;
@@ -108,7 +108,13 @@ impl Printer {
 
     fn notice(&self, text: &str) {
         let _output = self.output.lock();
-        match &self.bar {
+        self.printer_of_notices()(text);
+    }
+
+    /// Returns a function that prints a line on standard error, above the bar, from any thread.
+    pub fn printer_of_notices(&self) -> impl Fn(&str) + Send + use<> {
+        let bar = self.bar.clone();
+        move |text| match &bar {
             Some(bar) => bar.suspend(|| output::notice(text)),
             None => output::notice(text),
         }
@@ -135,6 +141,18 @@ impl Printer {
             None => format!("The study is in {folder}\n"),
         };
         self.print(&text);
+    }
+
+    /// Prints on standard error that a signal has ended the study, and how it continues.
+    pub fn interrupted(&self, study: &SelectedStudy, counted: u32, options: &Options) {
+        let again = match &options.join {
+            Some(storage) => format!("--join {storage}"),
+            None => format!("--resume {}", study.folder.display()),
+        };
+        self.notice(&format!(
+            "{counted} of {} counted; `quadfrog optimize {again}` continues the study",
+            trial::counted(options.budget() as usize, "trial")
+        ));
     }
 
     fn print(&self, text: &str) {

@@ -11,8 +11,8 @@ use super::plan::{ExperimentSize, PaperExperiment, ReproduceJob, all_jobs};
 use super::results::ReproduceResults;
 use super::work::{JobResult, Workplace};
 use crate::subcommand::failure::Failure;
+use crate::subcommand::interrupt::{AfterSignal, at_first_signal};
 use crate::subcommand::progress::Progress;
-use crate::subcommand::signals::{exit_by, on_signal};
 
 /// Runs the experiments on `threads` threads; when Ctrl-C or SIGTERM ends the program, what is complete is written to
 /// `interrupted`. The results do not depend on the number of threads.
@@ -34,7 +34,12 @@ pub fn run_experiments(
         asked: experiments.to_vec(),
         file: interrupted.to_owned(),
     });
-    write_when_interrupted(Arc::clone(&kept))?;
+    let at_signal = Arc::clone(&kept);
+    at_first_signal(move |_| {
+        let message = at_signal.keep();
+        notice!("{message}");
+        AfterSignal::End
+    });
     let studies = jobs.iter().filter(|job| matches!(job, ReproduceJob::Study(_))).count();
     notice!("{studies} studies and {} runs on {threads} threads", jobs.len() - studies);
     let progress = Progress::new("experiments", jobs.iter().map(ReproduceJob::cost).sum(), None);
@@ -94,13 +99,4 @@ impl KeptResults {
             Err(failure) => format!("interrupted: {file} could not be written: {failure}"),
         }
     }
-}
-
-/// Ends the process on Ctrl-C, SIGTERM or the loss of the terminal, at once, after the complete experiments were written.
-fn write_when_interrupted(kept: Arc<KeptResults>) -> Result<(), Failure> {
-    on_signal(move |signal| {
-        let message = kept.keep();
-        notice!("{message}");
-        exit_by(signal);
-    })
 }
