@@ -1,6 +1,7 @@
 //! The configuration in force: its files loaded and checked, and the settings of each part drawn from them.
 
 use std::collections::HashMap;
+use std::io::ErrorKind;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -81,8 +82,9 @@ impl Config {
             refuse_unknown_files(folder)?;
             for (name, _) in FILES {
                 let path = folder.join(name);
-                if path.exists() {
-                    let text = read_text(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                let unread = |source| ConfigError::Read { path: path.clone(), source };
+                if path.try_exists().map_err(unread)? {
+                    let text = read_text(&path).map_err(unread)?;
                     texts.push((name.to_owned(), path.display().to_string(), text));
                 }
             }
@@ -422,7 +424,10 @@ fn without_type_names(message: &str) -> String {
 fn refuse_unknown_files(folder: &Path) -> Result<(), ConfigError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
-        Err(_) => return Err(ConfigError::NoFolder { path: folder.to_owned() }),
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Err(ConfigError::NoFolder { path: folder.to_owned() });
+        }
+        Err(source) => return Err(ConfigError::Read { path: folder.to_owned(), source }),
     };
     for entry in entries {
         let path = entry.map_err(|source| ConfigError::Read { path: folder.to_owned(), source })?.path();

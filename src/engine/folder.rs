@@ -166,13 +166,23 @@ pub fn check_kept_config(config: &Path) -> Result<(), ConfigError> {
         .map_or(Ok(()), |path| Err(ConfigError::Empty { path }))
 }
 
-/// Returns the study files of `folder` and of the folders in it, in the order of their names.
+/// Returns whether there is a file of this name. A place that cannot be looked at is an error, not a missing file.
+pub(super) fn is_file(path: &Path) -> io::Result<bool> {
+    match path.metadata() {
+        Ok(about) => Ok(about.is_file()),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Returns the study files of `folder` and of the folders in it, in the order of their names; also those of which it cannot be known
+/// whether they are there.
 pub fn study_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let own = folder.join(STUDY_FILE);
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?
         .filter_map(|entry| Some(entry.ok()?.path().join(STUDY_FILE)))
         .chain([own])
-        .filter(|file| file.is_file())
+        .filter(|file| is_file(file).unwrap_or(true))
         .collect();
     files.sort();
     Ok(files)

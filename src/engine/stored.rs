@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::EngineError;
-use super::folder::{STUDY_FILE, study_files};
+use super::folder::{STUDY_FILE, is_file, study_files};
 use crate::config::Config;
 use crate::optimize::ask::{Direction, SamplerConfig};
-use crate::optimize::journal::{Durability, StudyRecord};
+use crate::optimize::journal::{Durability, JournalError, StudyRecord};
 use crate::optimize::space::{Range, Space};
 use crate::optimize::study::{ModelBest, Storage, Study, StudyError, StudyOptions};
 use crate::optimize::trial::{Distribution, Trial};
@@ -27,6 +27,19 @@ pub struct StoredStudy {
     pub budget: Option<u32>,
     /// Unit of the objective; none for that of the task.
     pub unit: Option<String>,
+}
+
+/// Returns whether there is a journal to read in `storage`: to open the journal of a missing file would make its folder.
+///
+/// # Errors
+/// When it is a file and its place cannot be looked at.
+pub fn has_journal(storage: &Storage) -> Result<bool, EngineError> {
+    match storage {
+        Storage::Memory => Ok(false),
+        Storage::File(file) => is_file(file)
+            .map_err(|source| StudyError::from(JournalError::Io { action: "open", path: file.clone(), source }).into()),
+        Storage::Redis(_) => Ok(true),
+    }
 }
 
 /// Returns the studies of this program in `storage`; none if the file does not exist.
@@ -98,7 +111,7 @@ impl Opened {
 /// read.
 pub fn open_stored(storage: &Storage, name: Option<&str>, config: &Config) -> Result<Opened, EngineError> {
     if let Storage::File(file) = storage
-        && !file.is_file()
+        && !has_journal(storage)?
     {
         let folder = file.parent().filter(|folder| file.ends_with(STUDY_FILE) && folder.is_dir());
         return Err(match folder {

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::folder::STUDY_FILE;
 use super::options::{EngineError, Options};
+use super::stored::has_journal;
 use crate::optimize::ask::{Direction, SamplerConfig, SamplerKind};
 use crate::optimize::journal::{Durability, StudyRecord};
 use crate::optimize::space::{Range, Space, SpaceError};
@@ -224,13 +225,7 @@ fn check_stored(
     check: impl FnOnce(&StudyRecord) -> Result<(), EngineError>,
 ) -> Result<(), EngineError> {
     let storage = storage(options);
-    let exists = match &storage {
-        Storage::Memory => false,
-        // Opening a journal file would create its folder.
-        Storage::File(file) => file.is_file(),
-        Storage::Redis(_) => true,
-    };
-    if !exists {
+    if !has_journal(&storage)? {
         return Ok(());
     }
     let journal = storage.journal(Durability::Buffered).map_err(StudyError::from)?;

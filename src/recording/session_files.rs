@@ -1,5 +1,6 @@
 //! The recordings in a folder: `session.mcap`, `session-2.mcap`, ...; while they are written, with the ending `.part`.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -55,7 +56,7 @@ pub fn unfinished_in(folder: &Path) -> Vec<PathBuf> {
 /// Returns the files that a path names: itself, the recordings of a folder, or those of the newest study in it.
 ///
 /// # Errors
-/// When there is no such path, or a folder and the folders in it have no recording.
+/// When there is no such path, a folder and the folders in it have no recording, or one of them cannot be read.
 pub fn recordings_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if !path.is_dir() {
         return match path.try_exists() {
@@ -63,16 +64,26 @@ pub fn recordings_of(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
             _ => Ok(vec![path.into()]),
         };
     }
+    // A folder that cannot be read is not one without a recording.
+    let readable = |folder: &Path| match std::fs::read_dir(folder) {
+        Err(source) if source.kind() == ErrorKind::PermissionDenied => {
+            Err(RecordingError::Io { path: folder.into(), doing: "read the folder", source })
+        }
+        _ => Ok(()),
+    };
+    readable(path)?;
     let own = recordings_in(path);
     if !own.is_empty() {
         return Ok(own);
     }
     let newest = entries(path).map(|folder| recordings_in(&folder)).max_by_key(|files| changed(files));
-    newest.filter(|files| !files.is_empty()).ok_or_else(|| {
-        let studies = entries(path).flat_map(|folder| entries(&folder).collect::<Vec<_>>());
-        let deeper = studies.filter(|study| !recordings_in(study).is_empty()).min();
-        RecordingError::NoRecording { path: path.into(), deeper }
-    })
+    if let Some(files) = newest.filter(|files| !files.is_empty()) {
+        return Ok(files);
+    }
+    entries(path).try_for_each(|folder| readable(&folder))?;
+    let studies = entries(path).flat_map(|folder| entries(&folder).collect::<Vec<_>>());
+    let deeper = studies.filter(|study| !recordings_in(study).is_empty()).min();
+    Err(RecordingError::NoRecording { path: path.into(), deeper })
 }
 
 /// The paths in a folder; none of one that cannot be read.

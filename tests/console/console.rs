@@ -46,6 +46,7 @@ mod operator_mistakes;
 mod optuna_versions;
 mod output;
 mod parameters;
+mod places;
 mod prior;
 mod queue;
 mod readme_rules;

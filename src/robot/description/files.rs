@@ -157,7 +157,13 @@ impl RobotFiles {
     /// As of [`RobotFiles::from_folder`] and [`RobotFiles::embedded`].
     pub fn open(model: &str) -> Result<RobotFiles, DescriptionError> {
         let folder = Path::new(model);
-        if folder.is_dir() { RobotFiles::from_folder(folder) } else { RobotFiles::embedded(model) }
+        match folder.metadata() {
+            Ok(about) if about.is_dir() => RobotFiles::from_folder(folder),
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+                Err(DescriptionError::Read { file: folder.to_owned(), reason: error.to_string() })
+            }
+            _ => RobotFiles::embedded(model),
+        }
     }
 
     /// The robot's own configuration: path and text of files with the names of those of a configuration folder. Their keys replace

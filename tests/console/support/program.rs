@@ -169,16 +169,31 @@ pub fn with_small_files(program: &Program, blocks: u32, arguments: &[&str]) -> (
 
 /// Runs the command so that the system gives it no further thread.
 pub fn without_threads(program: &Program, arguments: &[&str]) -> Output {
-    // A copy that every user may run.
-    let copy = program.path("quadfrog");
-    fs::copy(env!("CARGO_BIN_EXE_quadfrog"), &copy).unwrap();
     let mut command = Command::new("bash");
-    command.args(["-c", "ulimit -u 1; exec \"$0\" \"$@\""]).arg(copy).args(arguments);
+    command.args(["-c", "ulimit -u 1; exec \"$0\" \"$@\""]).arg(copy_for_all(program)).args(arguments);
+    as_bound_user(program, &mut command).output().unwrap()
+}
+
+/// Runs the command as a user for whom the permissions of files hold.
+pub fn with_permissions(program: &Program, arguments: &[&str]) -> Output {
+    as_bound_user(program, Command::new(copy_for_all(program)).args(arguments)).output().unwrap()
+}
+
+/// A copy of the program that every user may run.
+fn copy_for_all(program: &Program) -> PathBuf {
+    let copy = program.path("quadfrog");
+    if !copy.exists() {
+        fs::copy(env!("CARGO_BIN_EXE_quadfrog"), &copy).unwrap();
+    }
+    copy
+}
+
+/// A command in the program's folder of a user whom limits and permissions bind: they do not bind the user root.
+fn as_bound_user<'a>(program: &Program, command: &'a mut Command) -> &'a mut Command {
     command.current_dir(program.path("")).env("XDG_CONFIG_HOME", program.path("no-configuration"));
     if nix::unistd::Uid::effective().is_root() {
-        // The limit does not bind the user root.
         command.uid(54_322);
         fs::set_permissions(program.path(""), Permissions::from_mode(0o777)).unwrap();
     }
-    command.output().unwrap()
+    command.stdin(Stdio::null())
 }

@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use crate::notice;
-use quadfrog::engine::{EngineError, STUDY_FILE, StoredStudy, stored_studies, stored_study};
+use quadfrog::engine::{EngineError, STUDY_FILE, StoredStudy, has_journal, stored_studies, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::trial::Task;
@@ -87,11 +87,7 @@ pub fn study_to_join(
     seed: Option<u32>,
     robot: &RobotDescription,
 ) -> Result<StoredStudy, Failure> {
-    let exists = match storage {
-        // Opening a journal file would create its folder.
-        Storage::File(file) => file.is_file(),
-        _ => true,
-    };
+    let exists = has_journal(storage)?;
     let all = if exists { stored_studies(storage)? } else { Vec::new() };
     let matches =
         |study: &&StoredStudy| task.is_none_or(|task| task == study.task) && seed.is_none_or(|seed| seed == study.seed);
@@ -133,7 +129,7 @@ pub fn study_to_continue(
         let name = folder.display();
         return Err(Failure::Input(format!("{name}: this is a file; give the folder of the study that it lies in")));
     }
-    if !file.is_file() {
+    if !has_journal(&Storage::File(file.clone()))? {
         let found = match folder.is_dir() {
             true => format!("there is no {STUDY_FILE} in this folder"),
             false => "there is no such folder".to_owned(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, newest_config, open_stored, stored_studies, study_files};
+use quadfrog::engine::{Opened, has_journal, newest_config, open_stored, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -24,10 +24,7 @@ use crate::subcommand::selection::parse_storage;
 pub fn load(place: &str) -> Result<Vec<ReportedStudy>, Failure> {
     let path = Path::new(place);
     let storage = parse_storage(place);
-    if let Storage::File(file) = &storage
-        && !file.is_file()
-        && path.is_dir()
-    {
+    if path.is_dir() && !has_journal(&storage)? {
         let files = study_files(path).map_err(|error| Failure::input(format!("{place}: {error}")))?;
         if files.is_empty() {
             let message =
@@ -48,8 +45,7 @@ fn of_storage(storage: &Storage) -> Result<Vec<ReportedStudy>, Failure> {
     };
     let kept = folder.as_deref().and_then(newest_config).map(|(_, config)| config);
     let config = Config::load(kept.as_deref())?;
-    let exists = !matches!(storage, Storage::File(file) if !file.is_file());
-    let ours = if exists { stored_studies(storage)? } else { Vec::new() };
+    let ours = if has_journal(storage)? { stored_studies(storage)? } else { Vec::new() };
     let mut opened: Vec<Opened> = Vec::new();
     for study in &ours {
         opened.push(open_stored(storage, study.name.as_deref(), &config)?);

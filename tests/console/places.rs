@@ -1,0 +1,41 @@
+//! Places of files in commands: without permission, with spaces, with names that are not UTF-8.
+
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
+
+use crate::program::{Program, with_permissions};
+
+/// Regression: what could not be looked at was called empty, or missing, or was left out.
+#[test]
+fn a_folder_without_permission_is_not_called_empty() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--output", "perm"]);
+    let study = program.study("perm");
+    fs::rename(&study, program.path("perm/st")).unwrap();
+    let closed = |mode| fs::set_permissions(program.path("perm/st"), Permissions::from_mode(mode)).unwrap();
+    closed(0o000);
+    for arguments in [
+        &["study", "list", "perm"][..],
+        &["study", "show", "perm/st"],
+        &["study", "best", "perm/st"],
+        &["study", "enqueue", "perm/st", "f0=1.2"],
+        &["report", "perm/st"],
+        &["optimize", "--resume", "perm/st"],
+        &["optimize", "--join", "perm/st"],
+        &["replay", "--check", "perm/st"],
+        &["replay", "--check", "perm"],
+        &["export", "perm/st"],
+        &["rejudge", "perm/st"],
+        &["screenshot", "perm/st"],
+        &["config", "check", "perm/st/config"],
+        &["config", "check", "perm/st"],
+        &["optimize", "--trials", "1", "--config", "perm/st/config"],
+        &["optimize", "--trials", "1", "--model", "perm/st/config/robot"],
+    ] {
+        let output = with_permissions(&program, arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{arguments:?}: {message}");
+        assert!(message.contains("Permission denied") && message.contains("perm"), "{arguments:?}: {message}");
+    }
+    closed(0o755);
+}
