@@ -382,6 +382,31 @@ fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
     assert!(words.contains("the confidence is below the wanted one"), "{words}");
 }
 
+/// Regression: in an open session the repeats went on, in a continued one they were over.
+#[test]
+fn a_verdict_changed_after_the_last_repeat_resumes_no_confirmation() {
+    for continued in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = open(folder.path());
+        (0..12).for_each(|_| jump(&mut experiment, 0.02));
+        experiment.confirm_best(60).unwrap();
+        let mut news = News::default();
+        told(&mut experiment, &mut news);
+        while news.search.as_ref().unwrap().confirming.is_some() {
+            jump(&mut experiment, 0.02);
+            told(&mut experiment, &mut news);
+        }
+        if continued {
+            experiment.close().unwrap();
+            experiment = open(folder.path());
+        }
+        let leader = news.points.iter().find(|point| point.confidence.is_some()).unwrap();
+        experiment.change_verdict(leader.trials[1], Verdict::Fall, "it fell on the video").unwrap();
+        assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "continued: {continued}");
+        assert_eq!(experiment.undoable(), None, "the result rests on it");
+    }
+}
+
 /// Regression: a simulator without noise gave "100.0 % confidence", because equal repeats have no spread.
 #[test]
 fn equal_repeats_give_no_confidence() {

@@ -86,6 +86,11 @@ impl BestConfirmation {
         self.reported = None;
     }
 
+    /// Returns whether the repeats are over.
+    pub fn is_over(&self) -> bool {
+        self.concluded.is_some()
+    }
+
     /// Writes the conclusion, once no verdict that it rests on can be undone any more.
     pub fn write_conclusion(&self, study: &mut Study) -> Result<(), StudyError> {
         #[derive(Serialize)]

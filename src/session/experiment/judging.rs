@@ -157,7 +157,8 @@ impl Experiment {
         }
         let Some(pending) = self.pending_verdict.as_ref().filter(|_| self.is_idle()) else {
             return not_now(
-                "there is no verdict to undo; the last one became final when the next trial was approved or skipped",
+                "there is no verdict to undo; the last one became final when the next trial was approved or skipped, or when another \
+                 verdict was changed after the repeats",
             );
         };
         let mut row = pending.suggestion.clone();

@@ -61,6 +61,11 @@ impl Experiment {
             old_verdict: before.name().to_owned(),
             old_value: row.value,
         };
+        // The repeats that confirm the best are over: their result stays, as in a study that is continued. The verdict that ended them
+        // is final then.
+        if self.confirmation.is_over() {
+            self.report_verdict()?;
+        }
         self.study.change_verdict(trial, &change)?;
         if let Some(row) = self.rows.get_mut(&trial) {
             (row.verdict, row.judged_by) = (Some(verdict), Some(JudgedBy::Operator));
