@@ -39,3 +39,20 @@ fn a_folder_without_permission_is_not_called_empty() {
     }
     closed(0o755);
 }
+
+/// Regression: a table of a user's own became readable for all.
+#[test]
+fn a_replaced_file_keeps_its_permissions() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "none"]);
+    let study = program.study("recordings");
+    let study = study.to_str().unwrap();
+    for (arguments, file) in [(&["study", "export", study][..], "trials.csv"), (&["report", study][..], "report.html")]
+    {
+        let write = [arguments, &["--output", file]].concat();
+        program.text(&write);
+        fs::set_permissions(program.path(file), Permissions::from_mode(0o640)).unwrap();
+        program.text(&write);
+        assert_eq!(program.path(file).metadata().unwrap().permissions().mode() & 0o777, 0o640, "{file}");
+    }
+}
