@@ -45,6 +45,7 @@ use self::study::open_without_prior;
 use crate::control::settings::ControlSettings;
 use crate::optimize::ask::SamplerKind;
 use crate::optimize::journal::Durability;
+use crate::printable::shell_word;
 use crate::realtime::channel::{ConsolePorts, Heartbeat, Lowering, StopLatch, channels};
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::scheduling::set_priority;
@@ -134,7 +135,7 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     let mut supervisor = supervise(parts, maker, &options, settings, &clock)?;
     let storage = supervisor.storage_watch();
     for file in unfinished {
-        let file = file.display();
+        let file = shell_word(&file);
         let message = format!(
             "an earlier session did not finish its recording. After this session: quadfrog recover {file} (replay and report read it as it is)"
         );

@@ -3,7 +3,7 @@
 use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
 
-use crate::program::{Program, with_permissions};
+use crate::program::{Program, assert_shows, with_permissions};
 
 /// Regression: what could not be looked at was called empty, or missing, or was left out.
 #[test]
@@ -55,4 +55,19 @@ fn a_replaced_file_keeps_its_permissions() {
         program.text(&write);
         assert_eq!(program.path(file).metadata().unwrap().permissions().mode() & 0o777, 0o640, "{file}");
     }
+}
+
+/// Regression: a shell read such a path as several words.
+#[test]
+fn printed_commands_have_paths_with_spaces_as_one_word() {
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "2", "--seed", "0", "--output", "sp ace/it's"]);
+    let study = program.study("sp ace/it's");
+    let best = program.text(&["study", "best", study.to_str().unwrap(), "--config", "sp ace/best"]);
+    assert_shows(&best, &["--config 'sp ace/best'\n"]);
+    assert_shows(&program.text(&["study", "list", "sp ace"]), &[r"`quadfrog study list 'sp ace/it'\''s'` finds"]);
+    let recording = fs::read(study.join("session.mcap")).unwrap();
+    fs::write(study.join("session.mcap"), &recording[..recording.len() / 2]).unwrap();
+    let output = program.run(&["export", study.to_str().unwrap()]);
+    assert_shows(&String::from_utf8_lossy(&output.stderr), &[r"/it'\''s/", "session.mcap'` keeps what can be read"]);
 }

@@ -11,6 +11,7 @@ use anyhow::{Context, anyhow};
 use crossterm::clipboard::CopyToClipboard;
 use nix::sys::signal::{Signal, raise};
 use quadfrog::engine::EngineHandle;
+use quadfrog::printable::shell_word;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::telemetry::Mode;
 use quadfrog::trial::counted;
@@ -369,7 +370,7 @@ impl Console {
             }
             Effect::ExportBest => {
                 let written = export::best(&self.model);
-                self.say_written(written, |path| format!("exported; start with quadfrog --config {}", path.display()));
+                self.say_written(written, |to| format!("exported; start with quadfrog --config {}", shell_word(to)));
             }
             Effect::Suspend if has_shell() => self.suspend(),
             Effect::Suspend => reply(&mut self.model, LogLevel::Warning, NO_SHELL),

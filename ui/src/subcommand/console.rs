@@ -20,6 +20,7 @@ use clap_complete::ArgValueCandidates;
 use quadfrog::config::{Config, ConfigError};
 use quadfrog::engine::{self, Options};
 use quadfrog::optimize::journal::notice_waits;
+use quadfrog::printable::shell_word;
 use quadfrog::recording::recorder::RecorderStatus;
 use quadfrog::recording::session_files::{recordings_in, unfinished_in};
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
@@ -233,14 +234,14 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         return failure.map_or(Ok(()), Err);
     }
     output::unbroken("The study and its recording are in", &folder.display().to_string());
-    output::unbroken("  continue the study: ", &format!("quadfrog --resume {}", folder.display()));
+    output::unbroken("  continue the study: ", &format!("quadfrog --resume {}", shell_word(&folder)));
     if let Some(recording) = recording {
-        output::unbroken("  play the recording: ", &format!("quadfrog replay {}", recording.display()));
+        output::unbroken("  play the recording: ", &format!("quadfrog replay {}", shell_word(&recording)));
     }
-    output::unbroken("  show its trials:    ", &format!("quadfrog study show {}", folder.display()));
-    output::unbroken("  make its report:    ", &format!("quadfrog report {}", folder.display()));
+    output::unbroken("  show its trials:    ", &format!("quadfrog study show {}", shell_word(&folder)));
+    output::unbroken("  make its report:    ", &format!("quadfrog report {}", shell_word(&folder)));
     for part in incomplete {
-        output::unbroken("  repair an incomplete recording: ", &format!("quadfrog recover {}", part.display()));
+        output::unbroken("  repair an incomplete recording: ", &format!("quadfrog recover {}", shell_word(&part)));
     }
     failure.map_or(Ok(()), Err)
 }

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use anyhow::anyhow;
+use quadfrog::printable::shell_word;
 use quadfrog::recording::player::Damage;
 
 use super::failure::Failure;
@@ -34,7 +35,7 @@ fn lines(damage: &[Damage]) -> Vec<String> {
 /// Returns a text about damage with the command that repairs it, if there is one.
 pub fn with_repair(text: &impl Display, damage: &Damage) -> String {
     match damage.is_recoverable {
-        true => format!("{text}; `quadfrog recover {}` keeps what can be read", damage.path.display()),
+        true => format!("{text}; `quadfrog recover {}` keeps what can be read", shell_word(&damage.path)),
         false => text.to_string(),
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::put_line;
 use clap::Args;
 use quadfrog::config::{Config, write_new_files};
+use quadfrog::printable::shell_word;
 use quadfrog::robot::description::{DescriptionError, Draft, read_text};
 use quadfrog::trial::{Backend, Task};
 
@@ -57,7 +58,7 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     for task in Task::ALL {
         put_line!("  {}: {}", task.name(), fitness(&config, &draft, task));
     }
-    put_line!("\nNext: quadfrog --model {}", folder.display());
+    put_line!("\nNext: quadfrog --model {}", shell_word(folder));
     Ok(())
 }
 

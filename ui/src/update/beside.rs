@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use quadfrog::printable::shell_word;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::trial::TrialRecord;
 
@@ -82,7 +83,7 @@ fn no_signals(model: &Model, trial: u32) -> String {
     if model.timeline.is_some() {
         return format!("the recording has no ticks of trial {trial}");
     }
-    let study = Path::new(&model.session.info.study).parent().unwrap_or(Path::new("")).display();
+    let study = shell_word(Path::new(&model.session.info.study).parent().unwrap_or(Path::new("")));
     match model.session.trials.ran.contains_key(&trial) {
         true => format!("the signals of trial {trial} are not kept any longer: quadfrog replay {study} shows them"),
         false => format!("trial {trial} was recorded in another session: quadfrog replay {study} shows it"),

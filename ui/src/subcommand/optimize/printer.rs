@@ -2,11 +2,13 @@
 
 use std::collections::HashMap;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use quadfrog::config::Config;
 use quadfrog::engine::Options;
+use quadfrog::printable::shell_word;
 use quadfrog::report::table;
 use quadfrog::session::experiment::Experiment;
 use quadfrog::trial::{self, MeasuredJump, RepeatRecord, Task, TrialRecord, Verdict};
@@ -146,8 +148,8 @@ impl Printer {
     /// Prints on standard error that a signal has ended the study, and how it continues.
     pub fn interrupted(&self, study: &SelectedStudy, counted: u32, options: &Options) {
         let again = match &options.join {
-            Some(storage) => format!("--join {storage}"),
-            None => format!("--resume {}", study.folder.display()),
+            Some(storage) => format!("--join {}", shell_word(Path::new(&storage.to_string()))),
+            None => format!("--resume {}", shell_word(&study.folder)),
         };
         self.notice(&format!(
             "{counted} of {} counted; `quadfrog optimize {again}` continues the study",

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::notice;
+use quadfrog::printable::shell_word;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::parallel::in_parallel;
 
@@ -93,8 +94,9 @@ impl KeptResults {
         let file = self.file.display();
         match results.write(&self.file) {
             Ok(()) => format!(
-                "interrupted: {file} has the complete experiments ({}); `quadfrog reproduce --from {file} --output DIR` makes their report",
-                names.join("; ")
+                "interrupted: {file} has the complete experiments ({}); `quadfrog reproduce --from {} --output DIR` makes their report",
+                names.join("; "),
+                shell_word(&self.file)
             ),
             Err(failure) => format!("interrupted: {file} could not be written: {failure}"),
         }

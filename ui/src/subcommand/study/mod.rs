@@ -13,6 +13,7 @@ use quadfrog::config::Config;
 use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, running_session, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
+use quadfrog::printable::shell_word;
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::table;
 use quadfrog::session::experiment::{self, CHANGED_PREFIX, fixed_in_words, rows_of};
@@ -121,8 +122,8 @@ fn list(folder: &Path) -> Result<(), Failure> {
     if files.is_empty() {
         let folders = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
         let deeper = folders.filter(|folder| study_files(folder).is_ok_and(|files| !files.is_empty())).min();
-        let hint =
-            deeper.map_or(String::new(), |deeper| format!("; `quadfrog study list {}` finds some", deeper.display()));
+        let hint = deeper
+            .map_or(String::new(), |deeper| format!("; `quadfrog study list {}` finds some", shell_word(&deeper)));
         output::text(&format!("There is no study in {0} or directly below it{hint}\n", folder.display()));
         return Ok(());
     }
@@ -321,7 +322,7 @@ fn best(selector: &StudySelector, config: Option<&Path>) -> Result<(), Failure> 
     };
     let config = selector.config()?;
     config.export(folder, ours.task, &best.parameters, &best.gains, &opened.parameters)?;
-    let (text, task, folder) = (best_line(&config, &opened, &rows), ours.task.name(), folder.display());
+    let (text, task, folder) = (best_line(&config, &opened, &rows), ours.task.name(), shell_word(folder));
     output::text(&format!("{text}Start a new study with it:  quadfrog --task {task} --config {folder}\n"));
     Ok(())
 }
