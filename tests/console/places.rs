@@ -1,9 +1,12 @@
 //! Places of files in commands: without permission, with spaces, with names that are not UTF-8.
 
+use std::ffi::OsStr;
 use std::fs::{self, Permissions};
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::PermissionsExt;
 
 use crate::program::{Program, assert_shows, with_permissions};
+use serde_json::Value;
 
 /// Regression: what could not be looked at was called empty, or missing, or was left out.
 #[test]
@@ -70,4 +73,16 @@ fn printed_commands_have_paths_with_spaces_as_one_word() {
     fs::write(study.join("session.mcap"), &recording[..recording.len() / 2]).unwrap();
     let output = program.run(&["export", study.to_str().unwrap()]);
     assert_shows(&String::from_utf8_lossy(&output.stderr), &[r"/it'\''s/", "session.mcap'` keeps what can be read"]);
+}
+
+/// Regression: a panic after the work.
+#[test]
+fn a_prior_is_described_also_where_its_name_is_not_utf_8() {
+    let program = Program::new();
+    program.write("mine/prior.toml", "worlds = 2\npoints = 16\n");
+    let mut command = program.command(&["prior", "--config", "mine", "--json", "--output"]);
+    let output = command.arg(OsStr::from_bytes(b"na\xffme.json")).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let made: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(made["file"], "na\u{fffd}me.json");
 }

@@ -78,7 +78,7 @@ pub fn run(arguments: &PriorArguments) -> Result<(), Failure> {
         );
         let made = json!({
             "task": arguments.task.name(),
-            "file": file,
+            "file": file.to_string_lossy(),
             "key": maker.key(),
             "reused": reused,
             "points": prior.points.len(),
