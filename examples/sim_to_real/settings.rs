@@ -8,7 +8,7 @@ use quadfrog::trial::Backend;
 
 use crate::studies::{AFTER, Proposer};
 
-/// What is compared; `main.rs` lists the keys.
+/// The comparison; `main.rs` lists the keys.
 pub(super) struct Settings {
     pub(super) tasks: Vec<String>,
     pub(super) proposers: Vec<Proposer>,

@@ -92,7 +92,7 @@ impl<'a> Fitted<'a> {
         Some(Candidate { expected: Some(expected), ..Candidate::from(values) })
     }
 
-    /// What the model expects at `values`, in the order of the space.
+    /// Returns what the model expects at `values`, in the order of the space.
     fn expect(self, values: &[f64]) -> Option<Expectation> {
         let (ask, prior, ensemble) = (self.ask, self.prior, self.ensemble);
         let value = |known: &Parameter| {
@@ -104,7 +104,7 @@ impl<'a> Fitted<'a> {
         Some(expectation(&acquisition, ask.direction, &unit, &ensemble.features(prior.prior(), &unit)))
     }
 
-    /// What the model says of the finished trials.
+    /// Returns what the model says of the finished trials.
     fn predict(self) -> Option<Vec<Prediction>> {
         let (direction, jumps) = (self.ask.direction, self.history.jumps.clone());
         let acquisition = self.acquisition(&[])?;

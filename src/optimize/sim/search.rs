@@ -177,7 +177,7 @@ impl<'a> Acquisition<'a> {
         Scored { point: x.to_vec(), score, prediction }
     }
 
-    /// What void and running trials together leave of a gain.
+    /// Returns the share of a gain that void and running trials together leave.
     fn away(&self, x: &[f64]) -> f64 {
         self.avoided.iter().map(|v| share_beside(x, v)).product()
     }
