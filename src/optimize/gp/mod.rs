@@ -183,7 +183,7 @@ impl Acquisition {
     }
 }
 
-/// 1 - exp(-|x - v|^2 / 2 r^2): what is left of a gain at x beside a void or running trial at v; r is [`VOID_RADIUS`].
+/// 1 - exp(-|x - v|^2 / 2 r^2): what is left of a gain at x beside a void or running trial at v; r is 0.1.
 pub fn share_beside(x: &[f64], v: &[f64]) -> f64 {
     let squared: f64 = x.iter().zip(v).map(|(x, v)| (x - v) * (x - v)).sum();
     -expm1(-0.5 * squared / (VOID_RADIUS * VOID_RADIUS))
