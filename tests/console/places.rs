@@ -86,3 +86,14 @@ fn a_prior_is_described_also_where_its_name_is_not_utf_8() {
     let made: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(made["file"], "na\u{fffd}me.json");
 }
+
+/// Regression: a folder of studies with the name of the built-in robot was taken for a robot that lacks its file.
+#[test]
+fn a_folder_of_studies_does_not_hide_the_built_in_robot() {
+    let program = Program::new();
+    fs::create_dir(program.path("go1")).unwrap();
+    program.text(&["optimize", "--trials", "1", "--output", "go1"]);
+    // A robot of the user's own comes first.
+    fs::write(program.path("go1/robot.toml"), "legs = 5").unwrap();
+    assert_shows(&program.refused(&["optimize", "--trials", "1"]), &["go1/robot.toml"]);
+}

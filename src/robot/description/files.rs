@@ -151,14 +151,18 @@ impl RobotFiles {
         RobotFiles { folder: origin.to_owned(), toml: toml.into(), urdf: Some(urdf.into()), config: Vec::new() }
     }
 
-    /// Opens the folder `model`, if there is one, or the embedded robot of that name.
+    /// Opens the folder `model`, if there is one, or the embedded robot of that name. A folder without `robot.toml`, as that of studies,
+    /// does not hide an embedded robot.
     ///
     /// # Errors
     /// As of [`RobotFiles::from_folder`] and [`RobotFiles::embedded`].
     pub fn open(model: &str) -> Result<RobotFiles, DescriptionError> {
         let folder = Path::new(model);
         match folder.metadata() {
-            Ok(about) if about.is_dir() => RobotFiles::from_folder(folder),
+            Ok(about) if about.is_dir() => match RobotFiles::embedded(model) {
+                Ok(embedded) if folder.join("robot.toml").try_exists().is_ok_and(|there| !there) => Ok(embedded),
+                _ => RobotFiles::from_folder(folder),
+            },
             Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
                 Err(DescriptionError::Read { file: folder.to_owned(), reason: error.to_string() })
             }
