@@ -21,7 +21,8 @@ pub fn is_unprintable(c: char) -> bool {
     c.is_control() || directs || matches!(c, '\u{fffe}' | '\u{ffff}')
 }
 
-/// Returns a path as one word of a shell's command line, in single quotes where it needs them (POSIX.1-2024, XCU 2.2.2).
+/// Returns a path as one word of a shell, in single quotes if it has other characters than letters, digits and `/._-+,:=@%`
+/// (POSIX.1-2024, XCU 2.2.2).
 pub fn shell_word(path: &Path) -> String {
     let path = path.display().to_string();
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c);

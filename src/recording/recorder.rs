@@ -244,16 +244,19 @@ impl Recorder {
         let before = self.last.back().map(|last| last.mode);
         self.last.push_back(*tick);
         if tick.mode == Mode::Fault && before != Some(Mode::Fault) {
-            // As with the ticks of a trial, nobody may wait for them.
-            let _ = self.handed.send(CollectedTicks::Fault(self.last.iter().copied().collect()));
+            self.hand(CollectedTicks::Fault(self.last.iter().copied().collect()));
         }
     }
 
     fn deliver_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
-            // A closed channel means that the session has ended; the file holds the ticks.
-            let _ = self.handed.send(CollectedTicks::Trial(trial));
+            self.hand(CollectedTicks::Trial(trial));
         }
+    }
+
+    fn hand(&self, ticks: CollectedTicks) {
+        // A closed channel means that the session has ended; the file holds the ticks.
+        let _ = self.handed.send(ticks);
     }
 }
 

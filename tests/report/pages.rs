@@ -146,7 +146,7 @@ fn a_table_wider_than_the_terminal_continues_below_with_its_first_column() {
     assert!(shown.contains("(m)") && shown.contains("11.00"), "{shown}");
 }
 
-/// Regression: a table whose rows need two columns to be told apart continued with the first one alone.
+/// Regression: a continued table repeated its first column alone, so that rows were alike.
 #[test]
 fn a_continued_table_repeats_every_column_that_names_a_row() {
     let names = ["configuration", "task"].map(Column::text);

@@ -354,11 +354,9 @@ fn the_best_of_a_finished_study_is_confirmed_beyond_its_budget() {
     assert_eq!(experiment.proposal().unwrap().source, ProposalSource::Sampler, "the search goes on");
 }
 
-/// Regression: after one of its verdicts was changed to a fall, the point of a confirmation still "leads with 97 % confidence".
-#[test]
-fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut experiment = open(folder.path());
+/// A study of twelve jumps whose best points were repeated until one of them leads.
+fn confirmed(folder: &Path) -> (Experiment, News) {
+    let mut experiment = open(folder);
     (0..12).for_each(|_| jump(&mut experiment, 0.02));
     experiment.confirm_best(60).unwrap();
     let mut news = News::default();
@@ -367,6 +365,14 @@ fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
         jump(&mut experiment, 0.02);
         told(&mut experiment, &mut news);
     }
+    (experiment, news)
+}
+
+/// Regression: after one of its verdicts was changed to a fall, the point of a confirmation still "leads with 97 % confidence".
+#[test]
+fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut experiment, mut news) = confirmed(folder.path());
     // One more jump, so that no verdict of the confirmation is the last one.
     jump(&mut experiment, 0.02);
     told(&mut experiment, &mut news);
@@ -387,15 +393,7 @@ fn a_confirmation_is_judged_anew_when_one_of_its_verdicts_is_changed() {
 fn a_verdict_changed_after_the_last_repeat_resumes_no_confirmation() {
     for continued in [false, true] {
         let folder = tempfile::tempdir().unwrap();
-        let mut experiment = open(folder.path());
-        (0..12).for_each(|_| jump(&mut experiment, 0.02));
-        experiment.confirm_best(60).unwrap();
-        let mut news = News::default();
-        told(&mut experiment, &mut news);
-        while news.search.as_ref().unwrap().confirming.is_some() {
-            jump(&mut experiment, 0.02);
-            told(&mut experiment, &mut news);
-        }
+        let (mut experiment, news) = confirmed(folder.path());
         if continued {
             experiment.close().unwrap();
             experiment = open(folder.path());

@@ -25,7 +25,7 @@ const RECONNECT_TIMEOUT: Duration = Duration::from_secs(120);
 /// Longest wait for a line that is counted and not there: another writer on a cluster sets it right after it has counted it.
 const LINE_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// First word of the script's error about lines that are not counted.
+/// Code of the script's error: lines are there that `log_number` does not count.
 const UNCOUNTED: &str = "UNCOUNTED";
 
 /// Shortest and longest pause between two attempts to connect.
