@@ -59,7 +59,7 @@ pub enum Dialog {
         input: Input,
         /// Whether the whole text is selected: the first character typed replaces it.
         replaces: bool,
-        problem: Option<String>,
+        problem: Option<Problem>,
     },
     /// The table does not show all trials: which of them to write.
     Export {
@@ -160,24 +160,46 @@ pub enum Purpose {
     Rejudge,
 }
 
-/// End of the message about a character that is not part of a number.
-pub const NOT_OF_A_NUMBER: &str = " does not belong here: type a number";
-/// End of the message about a character that is not part of a place in a recording.
-pub const NOT_OF_A_PLACE: &str = " does not belong here: type a time, #7 for a trial, best or fall";
+/// Reason why a form has not taken what was typed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// The reason.
+    pub text: String,
+    /// Whether a character was not taken and this is not yet acknowledged: 1.5 would become 15 unseen.
+    pub refused_character: bool,
+}
+
+impl Problem {
+    /// A character that is not part of a number.
+    pub fn not_of_a_number(character: char) -> Problem {
+        Problem::refused(character, "a number")
+    }
+
+    /// A character that is not part of a place in a recording.
+    pub fn not_of_a_place(character: char) -> Problem {
+        Problem::refused(character, "a time, #7 for a trial, best or fall")
+    }
+
+    fn refused(character: char, expected: &str) -> Problem {
+        let text = format!("`{character}` does not belong here: type {expected}");
+        Problem { text, refused_character: true }
+    }
+
+    /// The answer to the key that would use a number without a character that was not taken.
+    pub fn acknowledged(key_again: &str) -> Problem {
+        format!("a character was not taken; {key_again}").into()
+    }
+}
+
+impl From<String> for Problem {
+    fn from(text: String) -> Problem {
+        Problem { text, refused_character: false }
+    }
+}
 
 /// The places in a recording that can be typed; without a space where Space is STOP.
 pub fn places(space_is_text: bool) -> &'static str {
     if space_is_text { "12:34, 75.5 s, #7 or trial 7, best or fall" } else { "12:34, 75.5, #7, best or fall" }
-}
-
-/// Whether a message of a form is about a character that was not taken. It stays until it is acknowledged: 1.5 would become 15 unseen.
-pub fn is_refused_character(message: &str) -> bool {
-    [NOT_OF_A_NUMBER, NOT_OF_A_PLACE].iter().any(|end| message.ends_with(end))
-}
-
-/// The answer to the key that would use a number without a character that was not taken.
-pub fn acknowledges_refused_character(key_again: &str) -> String {
-    format!("a character was not taken; {key_again}")
 }
 
 impl Purpose {
@@ -236,15 +258,15 @@ impl Dialog {
 
     /// A line with a text that was refused.
     pub fn refused_field(purpose: Purpose, text: &str, problem: String) -> Dialog {
-        Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces: false, problem: Some(problem) }
+        Dialog::Field { purpose, input: Input::new(text.to_owned()), replaces: false, problem: Some(problem.into()) }
     }
 
     /// Whether the field or the form waits for an acknowledgement of a character that it has not taken: the next Enter confirms
     /// nothing.
     pub fn has_refused_character(&self) -> bool {
         match self {
-            Dialog::Field { problem, .. } => problem.as_deref().is_some_and(is_refused_character),
-            Dialog::Override(form) => form.problem.as_deref().is_some_and(is_refused_character),
+            Dialog::Field { problem, .. } => problem.as_ref().is_some_and(|problem| problem.refused_character),
+            Dialog::Override(form) => form.has_refused_character(),
             _ => false,
         }
     }
@@ -306,7 +328,7 @@ pub struct OverrideForm {
     pub typing: Option<Input>,
     /// Whether the whole typed number is selected, because it was refused: the first character typed replaces it.
     pub replaces: bool,
-    pub problem: Option<String>,
+    pub problem: Option<Problem>,
     /// The typed number that Esc has dropped, until the next key.
     pub dropped: Option<String>,
 }
@@ -355,6 +377,11 @@ impl OverrideForm {
             problem: None,
             dropped: None,
         }
+    }
+
+    /// Whether it waits for an acknowledgement of a character that it has not taken.
+    pub fn has_refused_character(&self) -> bool {
+        self.problem.as_ref().is_some_and(|problem| problem.refused_character)
     }
 
     /// Whether it holds values that the session has not received.

@@ -3,12 +3,15 @@
 use std::time::Duration;
 
 use quadfrog::engine::STOP_BY;
-use quadfrog::recording::record::{LogLevel, Record, RequestRecord, StageRecord, Stamped, Transition};
+use quadfrog::recording::record::{
+    LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
+};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::session::storage::{ANSWERED_AFTER, ANSWERS_LATER};
 use quadfrog::telemetry::{Fault, Mode, TransitionCause};
 use quadfrog::trial::{
-    Approval, ExperimentStage, Proposal, ProposalSource, ProposedParameter, TrialRecord, Verdict, six_digits,
+    Approval, ExperimentStage, Proposal, ProposalInsight, ProposalSource, ProposedParameter, TrialRecord, Verdict,
+    six_digits,
 };
 
 use super::request::{cancelled, quote, reply, say};
@@ -110,165 +113,190 @@ pub(super) fn end_answer(model: &mut Model) {
 }
 
 fn apply(model: &mut Model, stamped: Stamped) -> Vec<Effect> {
-    let time_ns = stamped.time_ns;
-    let mut bells = Vec::new();
-    match stamped.record {
-        Record::Session(info) => {
-            let (task, robot, backend) = (info.task_name(), &info.robot, info.backend_name());
-            let (sampler, version, seed) = (info.sampler_name(), &info.version, info.seed);
-            let text = format!("{task} on {robot} ({backend}), {sampler} {version}, seed {seed}");
-            // The next file of the same session begins with it, too.
-            let known = &model.session.info;
-            let continued = !known.recording.is_empty()
-                && (&info.started, info.started.is_empty()) == (&known.started, false)
-                && info.recording != known.recording;
-            if !continued && !known.started.is_empty() {
-                // An answer that an earlier session gave is none of this one.
-                model.message = None;
-            }
-            model.session.info = info;
-            if !continued {
-                model.session.control_taken = false;
-                log(model, time_ns, LogLevel::Info, "session", text, false);
-            }
-        }
-        Record::Transition(change) => {
-            let stopped = matches!(change.to, Mode::Damped | Mode::Fault);
-            let level = match change.to {
-                Mode::Fault => LogLevel::Error,
-                Mode::Damped => LogLevel::Warning,
-                Mode::SitDown if is_unasked(&change) => LogLevel::Warning,
-                _ => LogLevel::Info,
-            };
-            if change.to == Mode::SitDown && level == LogLevel::Warning {
-                model.session.sat_down_because.clone_from(&change.cause);
-                say(model, level, sat_down(&change.cause));
-            } else if change.to != Mode::Disarmed {
-                model.session.sat_down_because.clear();
-            }
-            // The observer who stopped may have been reported before the stop.
-            let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
-            let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
-            if stopped {
-                model.session.stopped_because = by_observer.map_or(&change.cause, |message| &message.text).clone();
-                // The STOP key was answered already.
-                if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
-                    say(model, level, format!("{}: {}", change.to.name(), change.cause));
-                }
-            }
-            if change.to == Mode::Fault {
-                bells.push(BellCause::Fault);
-            }
-            let text = format!("{} {} {}: {}", change.from.name(), model.theme.arrow(), change.to.name(), change.cause);
-            log(model, time_ns, level, "mode", text, change.to == Mode::Fault);
-        }
-        Record::Stage(info) => {
-            if let Some(before) = model.session.stage
-                && before.stage == ExperimentStage::Review
-                && info.stage != ExperimentStage::Review
-                && info.can_undo
-            {
-                model.session.last_judged = Some(before.trial);
-            }
-            let entered =
-                model.session.stage.is_none_or(|before| (before.stage, before.trial) != (info.stage, info.trial));
-            model.session.stage = Some(info);
-            if entered {
-                note_time(model, info, time_ns);
-                match info.stage {
-                    ExperimentStage::Proposed => bells.push(BellCause::Proposal),
-                    ExperimentStage::Review => {
-                        bells.push(BellCause::Verdict);
-                        show_landed(model);
-                        say_suggestion(model, info.trial);
-                    }
-                    ExperimentStage::Running => lay_ground(model, info.trial),
-                    ExperimentStage::Finished => {
-                        let best = model.session.trials.best_value();
-                        let best = best.map_or("no trial was accepted".to_owned(), |best| {
-                            let BestValue { trial, value, by_hand, chosen } = best;
-                            let unit = &model.session.info.unit;
-                            format!("the best{chosen} is trial {trial}, J = {value:.3} {unit}{by_hand}")
-                        });
-                        let confirmed = model.session.confirmation();
-                        let best = confirmed.map_or(best.clone(), |confirmed| format!("{best}; {confirmed}"));
-                        let (counted, budget) = (model.session.counted(), model.session.budget());
-                        let text = match counted > budget as usize {
-                            true => format!("{counted} trials already count; the study is finished: {best}"),
-                            false => format!("the study is finished: {best}"),
-                        };
-                        say(model, LogLevel::Info, text.clone());
-                        log(model, time_ns, LogLevel::Info, "study", text, true);
-                    }
-                }
-            }
-        }
-        Record::Proposal(proposal) => {
-            let unit =
-                |name: &str| model.session.parameter(name).map_or(String::new(), |info| format!(" {}", info.unit));
-            let value = |p: &ProposedParameter| format!("{} {}{}", p.name, six_digits(p.value), unit(&p.name));
-            let values: Vec<String> = proposal.parameters.iter().map(value).collect();
-            let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
-            log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
-            renumber(model, &proposal);
-            model.session.overrides.take(&proposal);
-            model.session.proposal = Some(proposal);
-        }
-        Record::Trial(trial) => {
-            if trial.verdict.is_none() && trial.suggested == Some(Verdict::Fall) {
-                bells.push(BellCause::Fall);
-            }
-            log_trial(model, time_ns, &trial);
-            let number = trial.trial;
-            let waited = model.session.trials.records.get(&number).is_some_and(|before| before.verdict.is_none());
-            if waited && trial.verdict.is_some() {
-                say_verdict_by_rule(model, &trial);
-            }
-            model.session.trials.records.insert(number, trial);
-            model.history.keep(model.session.trials.best().map(|best| best.trial));
-            if model.session.stage.is_some_and(|now| (now.stage, now.trial) == (ExperimentStage::Running, number)) {
-                lay_ground(model, number);
-            }
-            if model.session.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
-                say_suggestion(model, number);
-            }
-        }
+    let bell = apply_record(model, stamped);
+    close_stale_dialog(model);
+    let rings = bell.is_some_and(|cause| model.bell.contains(&cause)) && model.replay.is_none();
+    if rings { vec![Effect::Bell] } else { Vec::new() }
+}
+
+/// Applies a record; returns the cause for which the bell may ring.
+fn apply_record(model: &mut Model, Stamped { time_ns, record }: Stamped) -> Option<BellCause> {
+    match record {
+        Record::Session(info) => begin_session(model, time_ns, info),
+        Record::Transition(change) => return change_mode(model, time_ns, &change),
+        Record::Stage(info) => return change_stage(model, time_ns, info),
+        Record::Proposal(proposal) => propose(model, time_ns, proposal),
+        Record::Trial(trial) => return update_trial(model, time_ns, trial),
         Record::Request(command) => answer(model, time_ns, command),
         Record::Counters(counters) => model.snapshot.counters = counters,
-        Record::Log(line) => {
-            let waits = |shown: &Notice| shown.text.ends_with(ANSWERS_LATER);
-            let wait_ended = line.message.starts_with(ANSWERED_AFTER) && model.message.as_ref().is_some_and(waits);
-            if line.level > LogLevel::Info || wait_ended {
-                say(model, line.level, line.message.clone());
-            }
-            if line.source == "session" && line.message.starts_with(STOP_BY) {
-                model.message.iter_mut().for_each(|message| message.stop = true);
-                model.session.stopped_because.clone_from(&line.message);
-            }
-            log(model, time_ns, line.level, &line.source, line.message, false);
-        }
+        Record::Log(line) => log_line(model, time_ns, line),
         Record::ArmingChecks(list) => {
             model.session.arming_checks = list;
             model.session.arming_checked_ns = time_ns;
         }
         Record::Search(search) => model.session.search = Some(search),
-        Record::Insight(mut insight) => {
-            model.session.trials.model_best = insight.predicted_best().copied();
-            // Without a proposal, as at the end of a study, the reasons for the last one stay, with the number of its trial.
-            if let Some(before) = model.session.insight.take().filter(|_| insight.parameters.is_empty()) {
-                (insight.trial, insight.parameters) = (before.trial, before.parameters);
-            }
-            model.session.insight = Some(insight);
-        }
+        Record::Insight(insight) => explain(model, insight),
         Record::Points(points) => model.session.trials.points = points,
         Record::FaultTicks(ticks) => {
             let text = format!("the last {} ticks before the fault are in the recording", ticks.len());
             log(model, time_ns, LogLevel::Error, "control", text, false);
         }
     }
-    close_stale_dialog(model);
-    let rings = bells.iter().any(|cause| model.bell.contains(cause)) && model.replay.is_none();
-    if rings { vec![Effect::Bell] } else { Vec::new() }
+    None
+}
+
+/// Takes over the facts of a session. The next file of the same session begins with them, too.
+fn begin_session(model: &mut Model, time_ns: u64, info: SessionInfo) {
+    let (task, robot, backend) = (info.task_name(), &info.robot, info.backend_name());
+    let (sampler, version, seed) = (info.sampler_name(), &info.version, info.seed);
+    let text = format!("{task} on {robot} ({backend}), {sampler} {version}, seed {seed}");
+    let known = &model.session.info;
+    let continued = !known.recording.is_empty()
+        && (&info.started, info.started.is_empty()) == (&known.started, false)
+        && info.recording != known.recording;
+    if !continued && !known.started.is_empty() {
+        // An answer that an earlier session gave is none of this one.
+        model.message = None;
+    }
+    model.session.info = info;
+    if !continued {
+        model.session.control_taken = false;
+        log(model, time_ns, LogLevel::Info, "session", text, false);
+    }
+}
+
+/// Reports a change of mode; rings for a fault.
+fn change_mode(model: &mut Model, time_ns: u64, change: &Transition) -> Option<BellCause> {
+    let level = match change.to {
+        Mode::Fault => LogLevel::Error,
+        Mode::Damped => LogLevel::Warning,
+        Mode::SitDown if is_unasked(change) => LogLevel::Warning,
+        _ => LogLevel::Info,
+    };
+    if change.to == Mode::SitDown && level == LogLevel::Warning {
+        model.session.sat_down_because.clone_from(&change.cause);
+        say(model, level, sat_down(&change.cause));
+    } else if change.to != Mode::Disarmed {
+        model.session.sat_down_because.clear();
+    }
+    // The observer who stopped may have been reported before the stop.
+    let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
+    let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
+    if matches!(change.to, Mode::Damped | Mode::Fault) {
+        model.session.stopped_because = by_observer.map_or(&change.cause, |message| &message.text).clone();
+        // The STOP key was answered already.
+        if !(change.is_stop() && model.message.as_ref().is_some_and(|message| message.stop)) {
+            say(model, level, format!("{}: {}", change.to.name(), change.cause));
+        }
+    }
+    let text = format!("{} {} {}: {}", change.from.name(), model.theme.arrow(), change.to.name(), change.cause);
+    log(model, time_ns, level, "mode", text, change.to == Mode::Fault);
+    (change.to == Mode::Fault).then_some(BellCause::Fault)
+}
+
+/// Takes over the experiment's stage; rings for a proposal and for a trial that waits for its verdict.
+fn change_stage(model: &mut Model, time_ns: u64, info: StageRecord) -> Option<BellCause> {
+    let before = model.session.stage.replace(info);
+    if let Some(before) = before
+        && before.stage == ExperimentStage::Review
+        && info.stage != ExperimentStage::Review
+        && info.can_undo
+    {
+        model.session.last_judged = Some(before.trial);
+    }
+    if before.is_some_and(|before| (before.stage, before.trial) == (info.stage, info.trial)) {
+        return None;
+    }
+    note_time(model, info, time_ns);
+    match info.stage {
+        ExperimentStage::Proposed => Some(BellCause::Proposal),
+        ExperimentStage::Review => {
+            show_landed(model);
+            say_suggestion(model, info.trial);
+            Some(BellCause::Verdict)
+        }
+        ExperimentStage::Running => {
+            lay_ground(model, info.trial);
+            None
+        }
+        ExperimentStage::Finished => {
+            say_finished(model, time_ns);
+            None
+        }
+    }
+}
+
+/// Reports the end of the study with its best trial.
+fn say_finished(model: &mut Model, time_ns: u64) {
+    let best = model.session.trials.best_value();
+    let best = best.map_or("no trial was accepted".to_owned(), |BestValue { trial, value, by_hand, chosen }| {
+        format!("the best{chosen} is trial {trial}, J = {value:.3} {}{by_hand}", model.session.info.unit)
+    });
+    let confirmed = model.session.confirmation().map_or(String::new(), |confirmed| format!("; {confirmed}"));
+    let (counted, budget) = (model.session.counted(), model.session.budget());
+    let finished = match counted > budget as usize {
+        true => format!("{counted} trials already count; the study is finished"),
+        false => "the study is finished".to_owned(),
+    };
+    let text = format!("{finished}: {best}{confirmed}");
+    say(model, LogLevel::Info, text.clone());
+    log(model, time_ns, LogLevel::Info, "study", text, true);
+}
+
+/// Takes over a proposal, new or changed.
+fn propose(model: &mut Model, time_ns: u64, proposal: Proposal) {
+    let unit = |name: &str| model.session.parameter(name).map_or(String::new(), |info| format!(" {}", info.unit));
+    let value = |p: &ProposedParameter| format!("{} {}{}", p.name, six_digits(p.value), unit(&p.name));
+    let values: Vec<String> = proposal.parameters.iter().map(value).collect();
+    let text = format!("trial {} ({}): {}", proposal.trial, proposal.source.name(), values.join(", "));
+    log(model, time_ns, LogLevel::Info, "proposal", text, proposal.revision == 0);
+    renumber(model, &proposal);
+    model.session.overrides.take(&proposal);
+    model.session.proposal = Some(proposal);
+}
+
+/// Takes over a row of the trial table; rings for a suspected fall.
+fn update_trial(model: &mut Model, time_ns: u64, trial: TrialRecord) -> Option<BellCause> {
+    let suspects_fall = trial.verdict.is_none() && trial.suggested == Some(Verdict::Fall);
+    log_trial(model, time_ns, &trial);
+    let number = trial.trial;
+    let waited = model.session.trials.records.get(&number).is_some_and(|before| before.verdict.is_none());
+    if waited && trial.verdict.is_some() {
+        say_verdict_by_rule(model, &trial);
+    }
+    model.session.trials.records.insert(number, trial);
+    model.history.keep(model.session.trials.best().map(|best| best.trial));
+    if model.session.stage.is_some_and(|now| (now.stage, now.trial) == (ExperimentStage::Running, number)) {
+        lay_ground(model, number);
+    }
+    if model.session.under_review().is_some_and(|trial| trial.trial == number && trial.hand_value.is_none()) {
+        say_suggestion(model, number);
+    }
+    suspects_fall.then_some(BellCause::Fall)
+}
+
+/// Logs a line of the session, and shows it where it needs attention or ends a wait.
+fn log_line(model: &mut Model, time_ns: u64, line: LogRecord) {
+    let waits = |shown: &Notice| shown.text.ends_with(ANSWERS_LATER);
+    let wait_ended = line.message.starts_with(ANSWERED_AFTER) && model.message.as_ref().is_some_and(waits);
+    if line.level > LogLevel::Info || wait_ended {
+        say(model, line.level, line.message.clone());
+    }
+    if line.source == "session" && line.message.starts_with(STOP_BY) {
+        model.message.iter_mut().for_each(|message| message.stop = true);
+        model.session.stopped_because.clone_from(&line.message);
+    }
+    log(model, time_ns, line.level, &line.source, line.message, false);
+}
+
+/// Takes over the reasons for a proposal. Without one, as at the end of a study, those for the last one stay, with the number of its
+/// trial.
+fn explain(model: &mut Model, mut insight: ProposalInsight) {
+    model.session.trials.model_best = insight.predicted_best().copied();
+    if let Some(before) = model.session.insight.take().filter(|_| insight.parameters.is_empty()) {
+        (insight.trial, insight.parameters) = (before.trial, before.parameters);
+    }
+    model.session.insight = Some(insight);
 }
 
 /// Whether neither the operator nor the end of the session has sat the robot down: a failsafe, or the time without an approval.

@@ -26,7 +26,7 @@ use crate::action::Action;
 use crate::layout::MIN_COLUMNS;
 use crate::legal::palette;
 use crate::model::Model;
-use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Purpose};
+use crate::model::dialog::{APPROVAL_PAUSE, Choice, Dialog, MAX_WIDTH, OverrideForm, Problem, Purpose};
 use crate::text::range_example;
 use crate::theme::{Glyphs, Role, Theme};
 use crate::wrap::{wrap, wrap_all};
@@ -59,7 +59,7 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
             text_box(frame, area, model, &format!("Override trial #{}", form.trial), lines)
         }
         Dialog::Field { purpose, input, replaces, problem } => {
-            let lines = field(model, *purpose, (input, *replaces), problem.as_deref());
+            let lines = field(model, *purpose, (input, *replaces), problem.as_ref());
             text_box(frame, area, model, &field_title(model, *purpose), lines);
         }
         Dialog::Palette { input, selected } => render_palette(frame, area, model, input, *selected),
@@ -221,7 +221,7 @@ fn overrides(model: &Model, form: &OverrideForm, width: usize) -> Vec<Line<'stat
     }
     let note = "This does not move the robot: it is approved like any other proposal.";
     let below = match (&form.problem, &form.dropped) {
-        (Some(problem), _) => span(theme, Role::Bad, problem.as_str()),
+        (Some(problem), _) => span(theme, Role::Bad, problem.text.as_str()),
         (None, Some(number)) => span(theme, Role::Warning, dropped(number, form)),
         (None, None) => span(theme, Role::Quiet, note),
     };
@@ -304,7 +304,7 @@ fn field(
     model: &Model,
     purpose: Purpose,
     (input, replaces): (&Input, bool),
-    problem: Option<&str>,
+    problem: Option<&Problem>,
 ) -> Vec<Line<'static>> {
     let theme = &model.theme;
     let mut spans = match replaces {
@@ -367,7 +367,8 @@ fn field(
         }
         Purpose::Note(_) | Purpose::TrialNumber => String::new(),
     };
-    let below = problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem));
+    let below =
+        problem.map_or_else(|| span(theme, Role::Quiet, hint), |problem| span(theme, Role::Bad, problem.text.as_str()));
     vec![Line::from(spans), Line::default(), Line::from(below)]
 }
 

@@ -11,9 +11,7 @@ use crate::action::Action;
 use crate::keymap::Key;
 use crate::message::Effect;
 use crate::model::Model;
-use crate::model::dialog::{
-    Dialog, NOT_OF_A_NUMBER, OverrideForm, OverrideRow, acknowledges_refused_character, is_refused_character,
-};
+use crate::model::dialog::{Dialog, OverrideForm, OverrideRow, Problem};
 use crate::update::request::{cancelled, does_nothing, reply, request};
 
 fn override_request(row: &OverrideRow) -> OperatorRequest {
@@ -36,12 +34,12 @@ impl OverrideForm {
     /// Reports, before a key uses the number, that a character of it was not taken; the key uses it when pressed again, and a digit
     /// begins the number anew.
     fn asks_about_refused_character(&mut self, key: Key, does: &str) -> bool {
-        if !self.problem.as_deref().is_some_and(is_refused_character) || self.is_outside() {
+        if !self.has_refused_character() || self.is_outside() {
             return false;
         }
         let shown = self.rows.get(self.selected).map(|row| six_digits(row.value)).unwrap_or_default();
         let number = self.typing.as_ref().map_or(shown.as_str(), |input| input.value());
-        self.problem = Some(acknowledges_refused_character(&format!("{key} again {does} {number}")));
+        self.problem = Some(Problem::acknowledged(&format!("{key} again {does} {number}")));
         self.replaces = true;
         true
     }
@@ -62,8 +60,8 @@ impl OverrideForm {
                 self.typing = None;
                 None
             }
-            Ok(value) => Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}")),
-            Err(_) => Some(format!("{name} needs a number from {low} to {high} {unit}")),
+            Ok(value) => Some(format!("{name} = {value} {unit} is outside {low} to {high} {unit}").into()),
+            Err(_) => Some(format!("{name} needs a number from {low} to {high} {unit}").into()),
         };
         self.replaces = self.problem.is_some();
         !self.replaces
@@ -133,14 +131,14 @@ pub(super) fn key(model: &mut Model, key: Key, mut form: OverrideForm) -> Vec<Ef
             if std::mem::take(&mut form.replaces) && (digit || deletes) {
                 form.typing = Some(Input::default());
             }
-            let refused = form.problem.take().filter(|text| is_refused_character(text));
+            let refused = form.problem.take().filter(|problem| problem.refused_character);
             form.problem = match key.typed() {
                 // An emptied number has none that the missing character could have changed.
                 _ if edits && edit(form.typing.get_or_insert_default(), key) => {
                     refused.filter(|_| form.typing.as_ref().is_some_and(|input| !input.value().is_empty()))
                 }
-                Some(c) => Some(format!("`{c}`{NOT_OF_A_NUMBER}")),
-                None => refused.or_else(|| Some(does_nothing(key, &form.keys(model)))),
+                Some(c) => Some(Problem::not_of_a_number(c)),
+                None => refused.or_else(|| Some(does_nothing(key, &form.keys(model)).into())),
             };
         }
     }

@@ -10,10 +10,7 @@ use crate::draw::clock_ms;
 use crate::keymap::Key;
 use crate::message::{Effect, ReplayCommand};
 use crate::model::Model;
-use crate::model::dialog::{
-    Dialog, NOT_OF_A_NUMBER, NOT_OF_A_PLACE, Purpose, Question, acknowledges_refused_character, is_refused_character,
-    places,
-};
+use crate::model::dialog::{Dialog, Problem, Purpose, Question, places};
 use crate::text::range_example;
 use crate::update::beside::chosen;
 use crate::update::rejudged;
@@ -28,10 +25,9 @@ pub(super) fn key(
     model: &mut Model,
     key: Key,
     purpose: Purpose,
-    (mut input, replaces, before): (Input, bool, Option<String>),
+    (mut input, replaces, before): (Input, bool, Option<Problem>),
 ) -> Vec<Effect> {
-    let not_of_it = if purpose == Purpose::Seek { NOT_OF_A_PLACE } else { NOT_OF_A_NUMBER };
-    let mut problem = before.filter(|text| is_refused_character(text));
+    let mut problem = before.filter(|problem| problem.refused_character);
     let refused = key.typed().filter(|c| purpose.characters().is_some_and(|allowed| !allowed.contains(*c)));
     // The selection ends with the first key that edits; one that types or deletes takes the text with it. A number that was refused is
     // selected again.
@@ -57,20 +53,20 @@ pub(super) fn key(
         KeyCode::Enter if problem.is_some() => {
             problem = Some(match (input.value(), purpose) {
                 ("", Purpose::HandValue(trial)) if model.session.measured_objective_of(trial).is_some() => {
-                    acknowledges_refused_character("Enter again goes back to the measured value")
+                    Problem::acknowledged("Enter again goes back to the measured value")
                 }
                 // The sentence names the character and what is taken.
-                ("", _) => format!("{}; Esc cancels", problem.unwrap_or_default()),
+                ("", _) => format!("{}; Esc cancels", problem.map_or(String::new(), |problem| problem.text)).into(),
                 (trial, Purpose::TrialNumber | Purpose::Beside) => {
-                    acknowledges_refused_character(&format!("Enter again looks for trial {trial}"))
+                    Problem::acknowledged(&format!("Enter again looks for trial {trial}"))
                 }
-                (number, _) => acknowledges_refused_character(&format!("Enter again confirms {number}")),
+                (number, _) => Problem::acknowledged(&format!("Enter again confirms {number}")),
             });
         }
         KeyCode::Enter => match submit(model, purpose, input.value().trim()) {
             Ok(effects) => return effects,
             Err(reason) => {
-                problem = Some(reason);
+                problem = Some(reason.into());
                 selected = purpose.characters().is_some() && !input.value().is_empty();
             }
         },
@@ -79,7 +75,8 @@ pub(super) fn key(
             input.handle(InputRequest::InsertChar(' '));
         }
         _ => match refused {
-            Some(c) => problem = Some(format!("`{c}`{not_of_it}")),
+            Some(c) if purpose == Purpose::Seek => problem = Some(Problem::not_of_a_place(c)),
+            Some(c) => problem = Some(Problem::not_of_a_number(c)),
             None => {
                 let edits = edit(&mut input, key);
                 selected = replaces && !edits;
