@@ -68,8 +68,8 @@ fn golden_controller() {
         let estimate = Estimate { world_from_body: orientation, contact: case.contact, ..Estimate::default() };
         let feet = leg::feet(&geometry, &case.joint_q);
         let torques = leg::torques(&target, &feet, &case.joint_v, &estimate);
-        for (joint, (torque_nm, expected)) in torques.iter().zip(&case.expect.torque_unclamped_nm).enumerate() {
-            torque.see(torque_nm - expected, || format!("case {number} joint {joint}"));
+        for (joint, (torque_n_m, expected)) in torques.iter().zip(&case.expect.torque_unclamped_nm).enumerate() {
+            torque.see(torque_n_m - expected, || format!("case {number} joint {joint}"));
         }
         for (leg, expect) in case.expect.feet.iter().enumerate() {
             let velocity = feet[leg].jacobian_leg * quadfrog::robot::leg_of(&case.joint_v, leg);

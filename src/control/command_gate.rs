@@ -135,8 +135,8 @@ fn limit_torque(
     all_finite(&[feedback], "a joint's angle or velocity")?;
     let wanted_n_m = clamped.torque_n_m + feedback;
     if settings.hardware && wanted_n_m.abs() > MOST_WANTED_N_M {
-        let (measured_nm, allowed_nm) = (wanted_n_m, MOST_WANTED_N_M);
-        return Err(Fault::WantedTorque { joint: joint as u8, measured_nm, allowed_nm });
+        let (measured_n_m, allowed_n_m) = (wanted_n_m, MOST_WANTED_N_M);
+        return Err(Fault::WantedTorque { joint: joint as u8, measured_n_m, allowed_n_m });
     }
     let most_n_m = torque_share * settings.max_torque[joint];
     let mut torque_n_m = wanted_n_m.clamp(-most_n_m, most_n_m);

@@ -49,7 +49,7 @@ pub struct Trip {
     pub fault: Fault,
 }
 
-type Cause = fn(&PeriodWatch, &FailsafeInputs, &ControlSettings) -> Option<Fault>;
+type Cause = fn(&FailsafeInputs, &ControlSettings) -> Option<Fault>;
 
 /// One row of the table.
 struct FailsafeRow {
@@ -329,15 +329,13 @@ const fn standing_or_ramping(mode: Mode) -> bool {
     matches!(mode, Mode::StandUp | Mode::Ready | Mode::Countdown | Mode::SitDown)
 }
 
-impl PeriodWatch {
-    /// Returns the strictest action of the rows that trip; of equal ones the first row's.
-    pub fn check(&self, inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Trip> {
-        let trips = TABLE.iter().filter(|row| (row.modes)(inputs.mode)).filter_map(|row| {
-            let fault = (row.cause)(self, inputs, settings)?;
-            Some(Trip { action: row.actions[inputs.phase as usize], fault })
-        });
-        trips.reduce(|strictest, trip| if trip.action > strictest.action { trip } else { strictest })
-    }
+/// Returns the strictest action of the rows that trip; of equal ones the first row's.
+pub fn check(inputs: &FailsafeInputs, settings: &ControlSettings) -> Option<Trip> {
+    let trips = TABLE.iter().filter(|row| (row.modes)(inputs.mode)).filter_map(|row| {
+        let fault = (row.cause)(inputs, settings)?;
+        Some(Trip { action: row.actions[inputs.phase as usize], fault })
+    });
+    trips.reduce(|strictest, trip| if trip.action > strictest.action { trip } else { strictest })
 }
 
 /// Returns the reason to refuse the next trial (HOLD); a running trial finishes.

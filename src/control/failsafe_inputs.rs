@@ -28,6 +28,8 @@ pub struct FailsafeInputs<'a> {
     pub loss_share: f64,
     /// Delay of the start of the tick, ns.
     pub lateness_ns: u64,
+    /// Periods of the last ticks.
+    pub period: PeriodWatch,
     /// `errno` of a failed send.
     pub send_error: Option<i32>,
     /// Time since the last heartbeat of the operator's console, ms.
@@ -70,7 +72,7 @@ pub struct PeriodWatch {
 }
 
 impl PeriodWatch {
-    /// Measures the period; to be called once per tick, before `check`.
+    /// Measures the period; to be called once per tick, before the table is checked.
     pub fn begin(&mut self, time_ns: u64, lateness_ns: u64, settings: &ControlSettings) {
         let began_ns = time_ns + lateness_ns;
         self.period_ms = self.began_ns.map_or(0.0, |before| began_ns.saturating_sub(before) as f64 * 1e-6);

@@ -51,11 +51,11 @@ impl PoseRamp {
         let mut blocked = None;
         for joint in 0..JOINTS {
             let error_rad = self.target[joint] - state.joint_position_rad[joint];
-            let torque_nm = self.settings.kp * error_rad - self.settings.kd * state.joint_velocity_rad_s[joint];
-            let allowed_nm = limits.ramp_torque_share * settings.max_torque[joint];
+            let torque_n_m = self.settings.kp * error_rad - self.settings.kd * state.joint_velocity_rad_s[joint];
+            let allowed_n_m = limits.ramp_torque_share * settings.max_torque[joint];
             let count = |ticks: u32, exceeds: bool| if exceeds { ticks + 1 } else { 0 };
             self.behind[joint] = count(self.behind[joint], error_rad.abs() > limits.ramp_error_rad);
-            self.strained[joint] = count(self.strained[joint], torque_nm.abs() > allowed_nm);
+            self.strained[joint] = count(self.strained[joint], torque_n_m.abs() > allowed_n_m);
             let joint_number = joint as u8;
             let fault = if self.behind[joint] >= most_ticks {
                 Fault::FollowingError {
@@ -64,7 +64,7 @@ impl PoseRamp {
                     allowed_rad: limits.ramp_error_rad,
                 }
             } else if self.strained[joint] >= most_ticks {
-                Fault::RampTorque { joint: joint_number, measured_nm: torque_nm, allowed_nm }
+                Fault::RampTorque { joint: joint_number, measured_n_m: torque_n_m, allowed_n_m }
             } else {
                 continue;
             };

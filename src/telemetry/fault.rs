@@ -33,11 +33,11 @@ pub enum Fault {
     #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_rad_s, *.allowed_rad_s, "rad/s", 1))]
     JointVelocity { joint: u8, measured_rad_s: f64, allowed_rad_s: f64 },
     /// The torque is that which the controller wants.
-    #[error("{} wanted a torque of {measured_nm:.1e} N m, limit {allowed_nm:.0} N m; check its sensors", joint_name(*.joint as usize))]
-    WantedTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },
+    #[error("{} wanted a torque of {measured_n_m:.1e} N m, limit {allowed_n_m:.0} N m; check its sensors", joint_name(*.joint as usize))]
+    WantedTorque { joint: u8, measured_n_m: f64, allowed_n_m: f64 },
     /// The torque is that which the motor estimates.
-    #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_nm, *.allowed_nm, "N m", 1))]
-    JointTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },
+    #[error("{} at {}", joint_name(*.joint as usize), exceeds(*.measured_n_m, *.allowed_n_m, "N m", 1))]
+    JointTorque { joint: u8, measured_n_m: f64, allowed_n_m: f64 },
     #[error("no state from the robot for {age_ms} ms, limit {allowed_ms} ms")]
     StateAge { age_ms: u32, allowed_ms: u32 },
     #[error("link to the robot lost: no state for {age_ms} ms, limit {allowed_ms} ms")]
@@ -98,8 +98,8 @@ pub enum Fault {
     #[error("{} blocked: distance from its target {}", joint_name(*.joint as usize), exceeds(*.measured_rad, *.allowed_rad, "rad", 3))]
     FollowingError { joint: u8, measured_rad: f64, allowed_rad: f64 },
     /// Standing up or sitting down: torque that the ramp demands.
-    #[error("{} blocked: demanded torque {}", joint_name(*.joint as usize), exceeds(*.measured_nm, *.allowed_nm, "N m", 1))]
-    RampTorque { joint: u8, measured_nm: f64, allowed_nm: f64 },
+    #[error("{} blocked: demanded torque {}", joint_name(*.joint as usize), exceeds(*.measured_n_m, *.allowed_n_m, "N m", 1))]
+    RampTorque { joint: u8, measured_n_m: f64, allowed_n_m: f64 },
 }
 
 /// A check of sensors against each other while the robot is commanded. The order is the order of the checks.

@@ -30,7 +30,7 @@ fn limits_of_the_motion_are_falls_and_other_faults_are_void() {
     let limits = [
         Fault::JointPosition { joint, measured_rad, allowed_rad },
         Fault::JointVelocity { joint, measured_rad_s: 70.0, allowed_rad_s: 60.0 },
-        Fault::JointTorque { joint, measured_nm: 50.0, allowed_nm: 40.0 },
+        Fault::JointTorque { joint, measured_n_m: 50.0, allowed_n_m: 40.0 },
         Fault::Tilt { measured_rad, allowed_rad },
     ];
     for fault in limits {
@@ -207,7 +207,7 @@ fn ends(settings: &ControlSettings) -> Vec<TrialEnd> {
     let mut faults = vec![
         Fault::JointPosition { joint, measured_rad, allowed_rad },
         Fault::JointVelocity { joint, measured_rad_s: 70.0, allowed_rad_s: 60.0 },
-        Fault::JointTorque { joint, measured_nm: 50.0, allowed_nm: 40.0 },
+        Fault::JointTorque { joint, measured_n_m: 50.0, allowed_n_m: 40.0 },
         Fault::StateAge { age_ms: 30, allowed_ms: 20 },
         Fault::LinkLost { age_ms: 300, allowed_ms: 200 },
         Fault::Corrupt { count: 11, allowed: 10 },
@@ -227,7 +227,7 @@ fn ends(settings: &ControlSettings) -> Vec<TrialEnd> {
         Fault::RemoteSilent { silent_ms: 3001, allowed_ms: 3000 },
         Fault::LinkDelay { measured_ms, allowed_ms },
         Fault::FollowingError { joint, measured_rad, allowed_rad },
-        Fault::RampTorque { joint, measured_nm: 50.0, allowed_nm: 40.0 },
+        Fault::RampTorque { joint, measured_n_m: 50.0, allowed_n_m: 40.0 },
     ];
     faults.extend(SensorCheck::ALL.iter().map(|&check| Fault::Sensors { check, measured, allowed }));
     let inhibits = [

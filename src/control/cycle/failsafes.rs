@@ -20,7 +20,7 @@ impl Cycle {
     /// 4. Sitting down in REVIEW, after LAND during the trial or the operator's request during jumps in a row.
     /// 5. Sitting down, after too long a wait in READY or REVIEW.
     pub(super) fn run_failsafes<R: Robot + ?Sized>(&mut self, inputs: &TickInputs, restarted: bool, robot: &R) {
-        self.failsafe.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
+        self.period_watch.begin(inputs.time_ns, inputs.lateness_ns, &self.settings);
         let failsafe_inputs = FailsafeInputs {
             mode: self.mode,
             phase: self.motion_phase(),
@@ -32,6 +32,7 @@ impl Cycle {
             delay_growth_ms: self.link_quality.delay_growth_ms(),
             loss_share: self.link_quality.loss_share(),
             lateness_ns: inputs.lateness_ns,
+            period: self.period_watch,
             send_error: self.send_error.take(),
             operator_silent_ms: inputs.operator_silent_ms,
             events_lost: inputs.events_lost,
@@ -41,7 +42,7 @@ impl Cycle {
             guard_silent_ms: inputs.guard_silent_ms,
             remote_silent_ms: self.remote_silent_ms,
         };
-        let trip = self.failsafe.check(&failsafe_inputs, &self.settings);
+        let trip = failsafe::check(&failsafe_inputs, &self.settings);
         self.warning = match (failsafe::warning(&failsafe_inputs, &self.settings), self.warning) {
             (Some(warning), _) => Some((warning, WARNING_TICKS)),
             (None, Some((warning, left))) if left > 1 => Some((warning, left - 1)),

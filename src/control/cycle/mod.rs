@@ -94,7 +94,7 @@ pub struct Cycle {
     /// Ticks since the last change of mode.
     mode_ticks: u32,
     estimator: Estimator,
-    failsafe: PeriodWatch,
+    period_watch: PeriodWatch,
     consistency: Consistency,
     /// The fault whose failsafe trips in this tick.
     tripped: Option<Fault>,
@@ -148,7 +148,7 @@ impl Cycle {
             mode_changes: 0,
             mode_ticks: 0,
             estimator: Estimator::default(),
-            failsafe: PeriodWatch::default(),
+            period_watch: PeriodWatch::default(),
             consistency: Consistency::default(),
             tripped: None,
             warning: None,
