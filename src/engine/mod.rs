@@ -56,7 +56,7 @@ use crate::recording::live::{LiveServer, LiveStatus};
 use crate::recording::record::{LogLevel, Record, Stamped};
 use crate::recording::recorder::{Recorder, RecorderHandle, RecorderStatus, RecorderWatch};
 use crate::recording::session_files::unfinished_in;
-use crate::robot::hardware::{HardwareError, Network, OpenedRobot};
+use crate::robot::hardware::{Network, OpenedRobot};
 use crate::robot::{Placement, Robot};
 use crate::session::arming_checklist::ArmingChecklist;
 use crate::session::operator_request::{OperatorRequest, StampedRequest};
@@ -67,7 +67,7 @@ use crate::sim::Simulator;
 use crate::telemetry::{Snapshot, Tick};
 use crate::trial::{Approval, Backend};
 
-/// File descriptors of a session: some twenty for files, sockets, the terminal and the guard.
+/// File descriptors of a session: some twenty for files, sockets, the terminal and the guard, and those of the robot's network.
 const NEEDED_DESCRIPTORS: u64 = 32;
 
 /// Distance of the priority of a robot's own threads to that of the control thread.
@@ -85,7 +85,8 @@ pub fn start(options: Options) -> Result<EngineHandle, EngineError> {
     // Before a word goes to the robot.
     check_backend(&options)?;
     let settings = options.config.settings(&options.robot, options.task, options.backend)?;
-    require_descriptors()?;
+    let of_network = options.network.as_ref().filter(|_| hardware).map_or(0, Network::descriptors);
+    require_descriptors(NEEDED_DESCRIPTORS + of_network)?;
     let maker = match options.config.optimize.sampler.kind {
         SamplerKind::Sim if options.prior.is_none() => {
             Some(PriorMaker::new(&options.config, &options.robot, options.task, options.backend)?)
@@ -227,14 +228,18 @@ fn supervise(
 
 /// Opens the robot in a thread below the control thread's `priority`: threads that a robot's library starts inherit it. The
 /// arming check of the control thread reports a denied priority.
-fn open_robot(network: &Network, damping_kd: f64, priority: u8) -> Result<OpenedRobot, HardwareError> {
+fn open_robot(network: &Network, damping_kd: f64, priority: u8) -> Result<OpenedRobot, EngineError> {
     let open = || {
         if priority > BELOW_CONTROL {
             let _denied = set_priority(priority - BELOW_CONTROL);
         }
         network.open(damping_kd)
     };
-    std::thread::scope(|scope| scope.spawn(open).join()).unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    std::thread::scope(|scope| {
+        let opener = std::thread::Builder::new().name("robot".into()).spawn_scoped(scope, open);
+        let opener = opener.map_err(EngineError::not_started("thread that opens the robot"))?;
+        Ok(opener.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
+    })
 }
 
 /// Finds or makes the prior of the sampler behind the session. One core is left to the control thread. An observer makes no
@@ -283,8 +288,8 @@ fn admit_observers(
     ObserverServer::start(facts, stop.clone(), report)
 }
 
-/// Checks that the session will not run out of file descriptors while it drives a robot.
-fn require_descriptors() -> Result<(), EngineError> {
+/// Checks that the session, which opens `needed` file descriptors, will not run out of them while it drives a robot.
+fn require_descriptors(needed: u64) -> Result<(), EngineError> {
     let lacking = |source| EngineError::System { what: "too few file descriptors".to_owned(), source };
     let (free, allowed) = match descriptors() {
         Ok(found) => found,
@@ -292,11 +297,11 @@ fn require_descriptors() -> Result<(), EngineError> {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Err(error) => return Err(lacking(error)),
     };
-    if free >= NEEDED_DESCRIPTORS {
+    if free >= needed {
         return Ok(());
     }
     let reason = format!(
-        "{free} of {allowed} are free, a session needs {NEEDED_DESCRIPTORS}; raise the limit, for example `ulimit -n 1024`"
+        "{free} of {allowed} are free, a session needs {needed}; raise the limit, for example `ulimit -n 1024`"
     );
     Err(lacking(std::io::Error::other(reason)))
 }

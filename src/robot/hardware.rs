@@ -155,6 +155,15 @@ impl Network {
         }
     }
 
+    /// Returns the file descriptors of the connection beyond a socket: two DDS participants have some hundred (117 were counted in a
+    /// session with an emulated Go2).
+    pub const fn descriptors(&self) -> u64 {
+        match self {
+            Network::Go1(_) => 0,
+            Network::Go2(_) => 120,
+        }
+    }
+
     /// Opens the robot without sending anything to it. `damping_kd` is the gain of the guard's command, N m s/rad.
     ///
     /// # Errors
