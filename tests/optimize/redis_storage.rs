@@ -5,6 +5,7 @@ use crate::redis;
 use crate::skip;
 use crate::support;
 use quadfrog::optimize::ask::SamplerConfig;
+use quadfrog::optimize::journal::Durability;
 use quadfrog::optimize::study::{Storage, Study, StudyError};
 use quadfrog::optimize::trial::{Trial, TrialState};
 use redis::{Ended, address, free_port, server, start};
@@ -206,7 +207,7 @@ fn a_missing_line_is_an_error_of_readers_and_writers() {
     }
 }
 
-/// Regression: the lines of a new study were written over the old ones.
+/// Regression: the lines of a new study were written over the old ones, and readers saw an empty server.
 #[test]
 fn lines_whose_number_was_lost_are_not_overwritten() {
     let Some((_server, url)) = server() else { return };
@@ -215,8 +216,11 @@ fn lines_whose_number_was_lost_are_not_overwritten() {
     let first = ::redis::cmd("GET").arg(":log:0").to_owned();
     let before: String = first.query(&mut connection).unwrap();
     ::redis::cmd("DEL").arg(":log_number").exec(&mut connection).unwrap();
-    let error = open(&url, 1).unwrap_err().to_string();
-    assert!(error.contains("127.0.0.1") && error.contains("Set :log_number"), "{error}");
+    let of_reader = Storage::Redis(url.clone()).journal(Durability::Buffered).unwrap_err().to_string();
+    let of_writer = open(&url, 1).unwrap_err().to_string();
+    for error in [of_reader, of_writer] {
+        assert!(error.contains("127.0.0.1") && error.contains("Set :log_number"), "{error}");
+    }
     assert_eq!(first.query::<String>(&mut connection).unwrap(), before);
 }
 

@@ -109,12 +109,10 @@ impl JournalRedis {
     /// is counted but not yet present, as on clusters, is waited for.
     ///
     /// # Errors
-    /// If the server cannot be read, has fewer lines than were read before, or has an invalid line; if a line is missing for
-    /// [`LINE_TIMEOUT`], or the wait for it was ended.
+    /// If the server cannot be read, has fewer lines than were read before, lines and no number of the last one, or an invalid line; if
+    /// a line is missing for [`LINE_TIMEOUT`], or the wait for it was ended.
     pub(super) fn read(&mut self, mut accept: impl FnMut(&str) -> Result<(), String>) -> Result<(), JournalError> {
-        let number = format!("{}:log_number", self.prefix);
-        let last: Option<i64> = self.ask("read", |c| redis::cmd("GET").arg(&number).query(c))?;
-        let last = last.unwrap_or(-1);
+        let last = self.last_line()?.unwrap_or(-1);
         if last + 1 < self.lines {
             let (address, had, has) = (self.address.clone(), self.lines, last + 1);
             return Err(JournalError::RedisShortened { address, had, has });
@@ -135,6 +133,27 @@ impl JournalRedis {
             }
         }
         Ok(())
+    }
+
+    /// Returns the number of the last line; none of an empty journal.
+    ///
+    /// # Errors
+    /// If the server cannot be read, or has a first line without the number of the last one: that was lost.
+    fn last_line(&mut self) -> Result<Option<i64>, JournalError> {
+        let [number, first] = ["log_number", "log:0"].map(|key| format!("{}:{key}", self.prefix));
+        // In one step: another writer may begin the journal meanwhile.
+        let keys = [&number, &first];
+        let (last, first): (Option<i64>, Option<String>) =
+            self.ask("read", |c| redis::cmd("MGET").arg(&keys).query(c))?;
+        match (last, first) {
+            (None, Some(_)) => Err(self.uncounted(0)),
+            (last, _) => Ok(last),
+        }
+    }
+
+    /// Returns the error of a line that `log_number` does not count.
+    fn uncounted(&self, index: i64) -> JournalError {
+        JournalError::RedisUncounted { address: self.address.clone(), prefix: self.prefix.clone(), index }
     }
 
     /// Waits a moment for the next line, which is counted and not there.
@@ -193,7 +212,7 @@ impl JournalRedis {
             };
             let address = self.address.clone();
             if source.code() == Some(UNCOUNTED) {
-                break Err(JournalError::RedisUncounted { address, prefix: self.prefix.clone(), index: self.lines });
+                break Err(self.uncounted(self.lines));
             }
             self.connection = None;
             if !self.answered || !is_passing(&source) || waited.elapsed() >= RECONNECT_TIMEOUT {
