@@ -153,6 +153,11 @@ pub fn newest_config(folder: &Path) -> Option<(u32, PathBuf)> {
     entries.filter_map(|entry| numbered(entry.ok()?.path())).max_by_key(|(number, _)| *number)
 }
 
+/// Returns the folder of the robot's files in a kept configuration; none in one of an earlier version.
+pub fn kept_robot(config: &Path) -> Option<PathBuf> {
+    Some(config.join(ROBOT_FOLDER)).filter(|robot| robot.is_dir())
+}
+
 /// Refuses a kept configuration with an empty file: it was whole when its study ran.
 ///
 /// # Errors

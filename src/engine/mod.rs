@@ -16,8 +16,8 @@ mod threads;
 mod verify;
 
 pub use folder::{
-    STUDY_FILE, attachments, check_kept_config, fingerprint, newest_config, prepare_folder, running_session,
-    study_files, utc_ns,
+    STUDY_FILE, attachments, check_kept_config, fingerprint, kept_robot, newest_config, prepare_folder,
+    running_session, study_files, utc_ns,
 };
 pub use ground::TrialGround;
 pub use guard::{GUARD, Guard, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};

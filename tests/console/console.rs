@@ -36,6 +36,7 @@ mod interrupts;
 mod judged_by;
 mod judging;
 mod kept_overrides;
+mod kept_robot;
 mod keys;
 mod live_view;
 mod log_view;

@@ -128,11 +128,19 @@ impl RobotFiles {
     /// # Errors
     /// `robot.toml`, the folder `config` or a file in it cannot be read.
     pub fn from_folder(folder: &Path) -> Result<RobotFiles, DescriptionError> {
-        let toml = read(folder.join("robot.toml"))?;
+        let toml = read(folder.join("robot.toml"))?.into();
+        let files = RobotFiles { folder: folder.to_owned(), toml, urdf: None, config: Vec::new() };
+        files.with_config(&folder.join(CONFIG))
+    }
+
+    /// Takes the TOML files of `folder`, if there is one, as the robot's own configuration.
+    ///
+    /// # Errors
+    /// The folder or a file in it cannot be read.
+    pub fn with_config(self, folder: &Path) -> Result<RobotFiles, DescriptionError> {
         let mut config = Vec::new();
-        let own = folder.join(CONFIG);
-        let unread = |e: io::Error| DescriptionError::Read { file: own.clone(), reason: e.to_string() };
-        let entries = match std::fs::read_dir(&own) {
+        let unread = |e: io::Error| DescriptionError::Read { file: folder.to_owned(), reason: e.to_string() };
+        let entries = match std::fs::read_dir(folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             entries => Some(entries.map_err(unread)?),
         };
@@ -143,7 +151,7 @@ impl RobotFiles {
             }
         }
         config.sort();
-        Ok(RobotFiles { folder: folder.to_owned(), toml: toml.into(), urdf: None, config })
+        Ok(RobotFiles { config, ..self })
     }
 
     /// Opens the robot of two texts, as a recording has them; `origin` is for messages.

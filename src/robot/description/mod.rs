@@ -124,6 +124,13 @@ impl RobotDescription {
         self.trunk.mass + self.legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.mass).sum::<f64>()
     }
 
+    /// Whether this and `other` are the same robot. Only the texts of the files may differ: comments, appearance and network are not
+    /// in the other fields.
+    pub fn is_same_robot(&self, other: &RobotDescription) -> bool {
+        let without_files = |robot: &RobotDescription| RobotDescription { files: Vec::new(), ..robot.clone() };
+        without_files(self) == without_files(other)
+    }
+
     /// Returns name and text of the URDF.
     pub fn urdf(&self) -> Option<(&str, &str)> {
         self.files.iter().find(|(name, _)| name != "robot.toml").map(|(name, text)| (name.as_str(), text.as_str()))

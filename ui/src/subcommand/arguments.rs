@@ -14,7 +14,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap_complete::ArgValueCandidates;
 use nix::unistd::{User, getuid};
 use quadfrog::config::Config;
-use quadfrog::engine::{Provenance, STUDY_FILE, check_kept_config, newest_config};
+use quadfrog::engine::{Provenance, STUDY_FILE, check_kept_config, kept_robot, newest_config};
 use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::printable::is_unprintable;
 use quadfrog::robot::description::{RobotDescription, RobotFiles};
@@ -166,7 +166,8 @@ pub struct StudyArguments {
     /// exists]
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
-    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml [default: the robot that is driven, else go1]
+    /// Robot model: go1, a1, go2, or a folder with a URDF and a robot.toml [default: that of a continued study, else the robot
+    /// that is driven, else go1]
     #[arg(long, value_name = "MODEL", add = ArgValueCandidates::new(completion::robots))]
     pub model: Option<String>,
     /// Sampler that proposes the parameters [default: from optimize.toml]
@@ -304,11 +305,45 @@ impl StudyArguments {
         }
     }
 
+    /// Loads the robot: that of `--model`, else the one that the study in `resume` ran with last, else `default`. A study of an
+    /// earlier version keeps none. For a kept robot that is not built in `--config` replaces values of the configuration that it ran
+    /// with, because the robot's own is in that. Returns also the robot's `--model`.
+    pub fn load_robot(
+        &self,
+        default: &str,
+        resume: Option<&Path>,
+    ) -> Result<(String, RobotFiles, RobotDescription), Failure> {
+        let with_description = |files: RobotFiles| Ok((files.description()?, files));
+        let load = |model: &str| load_model(model).map(|(files, robot)| (model.to_owned(), files, robot));
+        let config = resume.and_then(last_config);
+        let Some((folder, config)) = config.and_then(|config| Some((kept_robot(&config)?, config))) else {
+            return load(self.model.as_deref().unwrap_or(default));
+        };
+        let place = folder.display().to_string();
+        let kept = RobotFiles::from_folder(&folder).and_then(with_description);
+        let Some(model) = &self.model else {
+            let (robot, files) = kept.map_err(Failure::input)?;
+            return match RobotFiles::embedded(&robot.name).and_then(with_description) {
+                Ok((built_in, files)) if built_in.is_same_robot(&robot) => Ok((robot.name, files, built_in)),
+                _ if self.config.is_some() => Ok((place, files.with_config(&config).map_err(Failure::input)?, robot)),
+                _ => Ok((place, files, robot)),
+            };
+        };
+        let given = load(model)?;
+        match kept {
+            Ok((kept, _)) if !kept.is_same_robot(&given.2) => Err(Failure::Input(format!(
+                "--model {model}: the study ran with another robot, the {} in {place}; omit --model to continue with it, or begin a new study",
+                kept.name
+            ))),
+            // One that cannot be read is known by its name, which is compared with the study.
+            _ => Ok(given),
+        }
+    }
+
     /// Loads the configuration: that of `--config`, else the last one that the study in `resume` ran with, else as
     /// [`load_config_for`]. Returns also the notice that it is that of the study: for when the study was not refused.
     pub fn load_config(&self, robot: &RobotFiles, resume: Option<&Path>) -> Result<(Config, Option<String>), Failure> {
-        let resumed = resume.filter(|folder| self.config.is_none() && folder.join(STUDY_FILE).is_file());
-        let own = resumed.and_then(newest_config).map(|(_, config)| config);
+        let own = resume.and_then(last_config).filter(|_| self.config.is_none());
         if let Some(own) = &own {
             check_kept_config(own)?;
         }
@@ -326,6 +361,11 @@ impl StudyArguments {
         let now = jiff::Zoned::now().strftime("%Y-%m-%dT%H-%M-%S");
         self.output.join(format!("{now}-{}-seed{seed}", task.name()))
     }
+}
+
+/// Returns the configuration that the study in `folder` ran with last; none without a study there.
+fn last_config(folder: &Path) -> Option<PathBuf> {
+    newest_config(folder).filter(|_| folder.join(STUDY_FILE).is_file()).map(|(_, config)| config)
 }
 
 /// Seeds of the command line.

@@ -159,10 +159,9 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
             "--observe: the simulated robot moves by this session's commands alone; add --robot go1 or --robot go2";
         return Err(Failure::input(format!("{text}, or watch a running session: quadfrog attach")));
     }
-    let model = arguments.study.model.as_deref().unwrap_or(model);
-    let (files, robot) = arguments::load_model(model)?;
+    let (model, files, robot) = arguments.study.load_robot(model, arguments.resume.as_deref())?;
     let (config, continued) = arguments.study.load_config(&files, arguments.resume.as_deref())?;
-    let network = network(arguments, &files, model)?;
+    let network = network(arguments, &files, &model)?;
     let console = options(&arguments.screen, &config)?;
     let selected = match &arguments.resume {
         Some(folder) => study_to_continue(folder, arguments.task, arguments.seed, &robot)?,
@@ -210,14 +209,14 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
     options.folder = (!arguments.observe).then(|| folder.clone());
     let takeover = Arc::<Takeover>::default();
     let released = match &options.network {
-        Some(network) if !arguments.observe => take_over(network, arguments, &options.robot, &takeover)?,
+        Some(network) if !arguments.observe => take_over(network, arguments, &model, &options.robot, &takeover)?,
         _ => None,
     };
     let ended = run_session(options, console, continued, &takeover);
     // A terminal that has hung up shows nothing.
     let hung_up = matches!(ended, Ok((ConsoleExit::HungUp, _)));
     if let Some(controller) = released.filter(|_| !hung_up) {
-        put_line!("{}", way_back(arguments, &controller, IS_RELEASED));
+        put_line!("{}", way_back(arguments, &model, &controller, IS_RELEASED));
     }
     let (exit, recorded) = ended?;
     let recording = recorded.as_ref().map(|status| match status {
@@ -308,11 +307,11 @@ impl Takeover {
 const IS_RELEASED: &str = "is released, the legs are not supported";
 
 /// Returns the text with the command that starts the robot's own controller again. `state` is what is known about it.
-fn way_back(arguments: &ConsoleArguments, controller: &str, state: &str) -> String {
+fn way_back(arguments: &ConsoleArguments, model: &str, controller: &str, state: &str) -> String {
     let DdsArguments { interface, domain } = &arguments.dds;
     let option =
         |name: &str, value: Option<String>| value.map_or_else(String::new, |value| format!(" --{name} {value}"));
-    let model = option("model", arguments.study.model.clone());
+    let model = option("model", (model != RealRobot::Go2.name()).then(|| shell_word(Path::new(model))));
     let interface = option("interface", interface.clone());
     let domain = option("domain", domain.map(|domain| domain.to_string()));
     format!(
@@ -353,6 +352,7 @@ fn network(arguments: &ConsoleArguments, files: &RobotFiles, model: &str) -> Res
 fn take_over(
     network: &Network,
     arguments: &ConsoleArguments,
+    model: &str,
     robot: &RobotDescription,
     takeover: &Arc<Takeover>,
 ) -> Result<Option<String>, Failure> {
@@ -371,11 +371,11 @@ fn take_over(
     let taken = network.take_over(&robot.lying_position, interrupted, &mut |step| put_line!("  {step}"));
     let released = taken.map_err(|error| {
         if let Some(controller) = error.released_controller() {
-            put_line!("{}", way_back(arguments, controller, "may be released: the legs may not be supported"));
+            put_line!("{}", way_back(arguments, model, controller, "may be released: the legs may not be supported"));
         }
         if interrupted.load(Ordering::Acquire) { Failure::Other(error.into()) } else { Failure::input(error) }
     })?;
-    let text = released.as_ref().map(|controller| way_back(arguments, controller, IS_RELEASED));
+    let text = released.as_ref().map(|controller| way_back(arguments, model, controller, IS_RELEASED));
     *takeover.phase() = TakeoverPhase::Starting(text.clone());
     // A signal between the last request and this phase.
     if interrupted.load(Ordering::Acquire) {

@@ -10,7 +10,7 @@ use crate::{notice, output};
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::{Config, LEAST_F1_HZ};
-use quadfrog::engine::{EngineError, STUDY_FILE, newest_config, open_stored, stored_study};
+use quadfrog::engine::{EngineError, STUDY_FILE, kept_robot, newest_config, open_stored, stored_study};
 use quadfrog::optimize::study::Storage;
 use quadfrog::robot::description::RobotDescription;
 use quadfrog::session::evaluation::{EvaluatedRun, evaluate};
@@ -174,7 +174,7 @@ impl Source {
         let study = own.clone().or_else(|| study_of(given?.parent()?));
         let kept = if own.is_some() { given.and_then(newest_config).map(|(_, kept)| kept) } else { None };
         let folder = if own.is_some() { kept.as_deref() } else { given };
-        let kept_robot = study.as_ref().and(folder).map(|folder| folder.join("robot")).filter(|robot| robot.is_dir());
+        let kept_robot = study.as_ref().and(folder).and_then(kept_robot);
         let model = match (&arguments.model, kept_robot) {
             (Some(model), _) => model.clone(),
             (None, Some(kept)) => kept.display().to_string(),

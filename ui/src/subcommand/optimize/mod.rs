@@ -89,7 +89,7 @@ pub fn run(arguments: &OptimizeArguments) -> Result<(), Failure> {
         Some(Storage::File(file)) => file.parent(),
         _ => arguments.resume.as_deref(),
     };
-    let (files, robot) = arguments::load_model(arguments.study.model.as_deref().unwrap_or(arguments::DEFAULT_MODEL))?;
+    let (_, files, robot) = arguments.study.load_robot(arguments::DEFAULT_MODEL, existing)?;
     let (config, continued) = arguments.study.load_config(&files, existing)?;
     let studies = match &joined {
         Some(storage) => workers(arguments, storage, &robot)?,

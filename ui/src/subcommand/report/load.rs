@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, has_journal, newest_config, open_stored, stored_studies, study_files};
+use quadfrog::engine::{Opened, has_journal, kept_robot, newest_config, open_stored, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -134,7 +134,7 @@ fn read(own: &[PathBuf], elsewhere: &NamedRecordings, robot: &RobotDescription) 
 
 /// Returns the robot of a kept configuration, else the built-in one of that name.
 fn description(kept: Option<&Path>, name: &str) -> Option<RobotDescription> {
-    let own = kept.map(|config| config.join("robot")).filter(|robot| robot.is_dir());
+    let own = kept.and_then(kept_robot);
     let own = own.and_then(|robot| RobotFiles::open(robot.to_str()?).ok()?.description().ok());
     own.or_else(|| RobotDescription::embedded(name).ok())
 }
