@@ -246,3 +246,21 @@ fn a_draft_quotes_names_as_toml_does() {
         assert_eq!(draft.robot.name, name);
     }
 }
+
+/// Regression: the URDF was read from there, and the study kept one that its robot.toml did not name.
+#[test]
+fn a_urdf_that_is_not_beside_robot_toml_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("sub")).unwrap();
+    for name in ["go1.urdf", "sub/go1.urdf"] {
+        std::fs::write(folder.path().join(name), GO1).unwrap();
+    }
+    let absolute = folder.path().join("go1.urdf");
+    for name in ["sub/go1.urdf", absolute.to_str().unwrap(), "sub/../go1.urdf", "..", "", "robot.toml"] {
+        let toml = GO1_TOML.replacen("urdf = \"go1.urdf\"", &format!("urdf = \"{name}\""), 1);
+        assert_ne!(toml, GO1_TOML);
+        std::fs::write(folder.path().join("robot.toml"), toml).unwrap();
+        let message = RobotDescription::from_folder(folder.path()).unwrap_err().to_string();
+        assert!(message.contains(&format!("urdf: \"{name}\"; put the URDF beside robot.toml")), "{message}");
+    }
+}

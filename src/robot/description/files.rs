@@ -220,6 +220,14 @@ impl RobotFiles {
         let file = self.folder.join(&robot.urdf);
         let urdf = match &self.urdf {
             Some(text) => Cow::Borrowed(text.as_ref()),
+            // Elsewhere it would be missing beside the copy of robot.toml that a study keeps.
+            None if Path::new(&robot.urdf).file_name() != Some(robot.urdf.as_ref()) || robot.urdf == "robot.toml" => {
+                return invalid(
+                    "urdf",
+                    format!("{:?}", robot.urdf),
+                    "put the URDF beside robot.toml, and give the name of its file",
+                );
+            }
             None => read(file.clone())?.into(),
         };
         let parts = urdf::parse(&file, &urdf)?;
