@@ -264,3 +264,21 @@ fn a_urdf_that_is_not_beside_robot_toml_is_refused() {
         assert!(message.contains(&format!("urdf: \"{name}\"; put the URDF beside robot.toml")), "{message}");
     }
 }
+
+/// Regression: `<mimic>` and `<dynamics>` of a leg's joint were left out, and nothing said so.
+#[test]
+fn a_joint_that_follows_another_is_refused_and_its_friction_is_named_as_unused() {
+    let joint = "<axis xyz=\"0 1 0\"/>";
+    let message = refusal(joint, &format!("{joint}<mimic joint=\"FR_calf_joint\" multiplier=\"-2\"/>"));
+    assert!(message.contains("joint FR_thigh_joint: <mimic> of FR_calf_joint; each joint"), "{message}");
+    let drafted = |dynamics: &str| {
+        let urdf = GO1.replacen(joint, &format!("{joint}<dynamics {dynamics}/>"), 1);
+        Draft::of_urdf("go1", Path::new("go1.urdf"), &urdf).unwrap().missing.join("\n")
+    };
+    for dynamics in ["damping=\"0.1\"", "friction=\"0.2\""] {
+        let missing = drafted(dynamics);
+        assert!(missing.contains("<dynamics> (joints: FR_thigh_joint)"), "{missing}");
+        assert!(missing.contains("[actuator.hardware_like]"), "{missing}");
+    }
+    assert!(!drafted("damping=\"0\" friction=\"0\"").contains("<dynamics>"));
+}

@@ -70,6 +70,13 @@ impl Draft {
                     .to_owned(),
             );
         }
+        if !parts.unused_dynamics.is_empty() {
+            missing.push(format!(
+                "<dynamics> (joints: {}) is not taken from the URDF; give dry_friction_nm and viscous_friction_nm_s of \
+                 [actuator.hardware_like] in simulator.toml",
+                parts.unused_dynamics.join(", ")
+            ));
+        }
         let robot = RobotFiles::from_texts(Path::new(""), toml_text.clone(), text.to_owned()).description()?;
         Ok(Draft { toml: toml_text, robot, missing })
     }

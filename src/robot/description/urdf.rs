@@ -22,6 +22,8 @@ pub(super) struct UrdfContents {
     pub imu_origin: Option<Vector3<f64>>,
     pub joint_names: [String; JOINTS],
     pub links: Vec<LinkFrame>,
+    /// Joints of the legs whose damping or friction is not zero in the URDF, which has no effect.
+    pub unused_dynamics: Vec<String>,
 }
 
 /// Tolerance for lengths and directions that must be equal or zero, m: the precision of a drawing.
@@ -122,7 +124,13 @@ impl<'a> UrdfDocument<'a> {
             return self.invalid(&format!("link {name}"), problem, remedy);
         }
         let imu_origin = trunk.imu.map(|(_, frame)| frame.translation.vector);
-        Ok(UrdfContents { trunk: trunk.body, legs, leg_geometry, limits, imu_origin, joint_names, links })
+        let has_dynamics = |joint: &&Joint| {
+            joint_names.contains(&joint.name)
+                && joint.dynamics.as_ref().is_some_and(|part| part.damping != 0.0 || part.friction != 0.0)
+        };
+        let unused_dynamics = self.robot.joints.iter().filter(has_dynamics).map(|joint| joint.name.clone()).collect();
+        let trunk = trunk.body;
+        Ok(UrdfContents { trunk, legs, leg_geometry, limits, imu_origin, joint_names, links, unused_dynamics })
     }
 
     /// Returns all links but `root`, each once and after its parent.
@@ -225,6 +233,10 @@ impl<'a> UrdfDocument<'a> {
         if !matches!(joint.joint_type, JointType::Revolute) {
             let problem = format!("is {:?}", joint.joint_type);
             return self.invalid(&element, problem, "a leg's joint is revolute and has limits");
+        }
+        if let Some(mimic) = &joint.mimic {
+            let problem = format!("<mimic> of {}", mimic.joint);
+            return self.invalid(&element, problem, "each joint of a leg has a motor of its own: remove <mimic>");
         }
         let limit = &joint.limit;
         if limit.lower >= limit.upper || limit.lower.is_nan() || limit.upper.is_nan() {
