@@ -23,8 +23,8 @@ pub struct EvaluatedRun {
     pub measured: Option<MeasuredJump>,
     /// Objective, in the task's unit; 0 unless the robot stands at the end.
     pub value: f64,
-    /// Mean angle between the trunk's and the world's z axis at the starts of the impulses, rad.
-    pub tilt_at_impulse_rad: f64,
+    /// Mean angle between the trunk's and the world's z axis at the starts of the impulses, rad; none without an impulse.
+    pub tilt_at_impulse_rad: Option<f64>,
     /// Difference of the largest and the smallest roll from the first impulse on, rad.
     pub roll_range_rad: f64,
     /// The same of pitch, rad.
@@ -66,7 +66,7 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
         value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
         cause,
         measured,
-        tilt_at_impulse_rad: starts.iter().sum::<f64>() / starts.len().max(1) as f64,
+        tilt_at_impulse_rad: (!starts.is_empty()).then(|| starts.iter().sum::<f64>() / starts.len() as f64),
         roll_range_rad: if ticks.is_empty() { 0.0 } else { range(0) },
         pitch_range_rad: if ticks.is_empty() { 0.0 } else { range(1) },
         end,

@@ -233,3 +233,25 @@ fn without_a_free_thread_the_results_are_the_same() {
         assert_eq!(String::from_utf8(output.stdout).unwrap().replace("two.json", "one.json"), expected);
     }
 }
+
+/// A configuration whose joint velocities are so noisy that the failsafe trips before a trial can begin.
+fn with_noisy_joints() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[sensors]\nenabled = true\njoint_velocity_noise_rad_s = 100.0\n";
+    std::fs::write(folder.path().join("simulator.toml"), text).unwrap();
+    folder
+}
+
+/// Regression: a run without an impulse counted with a tilt of 0, and had -0.0 in JSON.
+#[test]
+fn a_run_without_an_impulse_has_no_tilt_at_one() {
+    let folder = with_noisy_joints();
+    let arguments = ["--point", "f0=1.3,Fx=40,Fz=210", "--config", folder.path().to_str().unwrap(), "--seeds", "0-1"];
+    for run in runs(&[&arguments[..], &["--json"]].concat()) {
+        assert_eq!(run.get("tilt_at_impulse_rad"), Some(&Value::Null), "{run}");
+    }
+    let table = String::from_utf8(evaluate(&arguments).stdout).unwrap();
+    // vmc, runs, falls; jumps and their deviation; value, tilt, roll and pitch.
+    let row: Vec<&str> = table.lines().find(|line| line.starts_with("on ")).unwrap().split_whitespace().collect();
+    assert_eq!(row[3..], ["0.0", "(0.0)", "-", "-", "-", "-"], "{table}");
+}

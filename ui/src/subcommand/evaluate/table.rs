@@ -6,7 +6,8 @@ use quadfrog::trial::{ParameterValues, counted, parameter_unit};
 
 use super::variant::{Variant, on_off};
 
-/// Returns the table as text. Jumps and tilt are those of all runs, the other columns those of the runs that stood.
+/// Returns the table as text. Jumps are those of all runs, the tilt is that of the runs with an impulse, the other columns those of
+/// the runs that stood.
 pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Variant, EvaluatedRun)]) -> String {
     let TrialSpec { task, jumps, rate, .. } = *spec;
     let values: Vec<String> =
@@ -39,11 +40,11 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
             friction(&variant.friction.map_or_else(String::new, |friction| format!("{friction}"))),
             all.len(),
             all.len() - stood.len(),
-            mean_and_spread(&all, 1, |run| f64::from(run.jumps)),
-            mean_and_spread(&stood, 3, |run| run.value),
-            mean_and_spread(&all, 3, |run| run.tilt_at_impulse_rad),
-            mean_and_spread(&stood, 3, |run| run.roll_range_rad),
-            mean_and_spread(&stood, 3, |run| run.pitch_range_rad),
+            mean_and_spread(all.iter().map(|run| f64::from(run.jumps)), 1),
+            mean_and_spread(stood.iter().map(|run| run.value), 3),
+            mean_and_spread(all.iter().filter_map(|run| run.tilt_at_impulse_rad), 3),
+            mean_and_spread(stood.iter().map(|run| run.roll_range_rad), 3),
+            mean_and_spread(stood.iter().map(|run| run.pitch_range_rad), 3),
         );
         for run in all.iter().filter(|run| !run.stood() || run.bounced()) {
             let time = run.fall_time_s.map_or(String::new(), |time| format!(" at {time:.2} s"));
@@ -52,21 +53,22 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
         }
     }
     text += "Means, of several runs with standard deviations; value, roll and pitch of the runs that stood.\n";
-    text += "Tilt: of the trunk when an impulse starts.\n";
+    text += "Tilt: of the trunk when an impulse starts, of the runs with an impulse.\n";
     text
 }
 
-/// Returns "0.251 (0.012)", of a single run "0.251"; "-" without runs.
-fn mean_and_spread(runs: &[&EvaluatedRun], digits: usize, value: fn(&EvaluatedRun) -> f64) -> String {
-    if runs.is_empty() {
+/// Returns "0.251 (0.012)", of a single value "0.251"; "-" without values.
+fn mean_and_spread(values: impl Iterator<Item = f64>, digits: usize) -> String {
+    let values: Vec<f64> = values.collect();
+    if values.is_empty() {
         return "-".to_owned();
     }
-    let count = runs.len() as f64;
-    let mean = runs.iter().map(|run| value(run)).sum::<f64>() / count;
-    if runs.len() == 1 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    if values.len() == 1 {
         return format!("{mean:.digits$}");
     }
-    let squares = runs.iter().map(|run| (value(run) - mean).powi(2)).sum::<f64>();
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     let spread = (squares / (count - 1.0)).sqrt();
     format!("{mean:.digits$} ({spread:.digits$})")
 }

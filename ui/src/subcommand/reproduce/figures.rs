@@ -122,7 +122,8 @@ fn continuous(results: &ReproduceResults) -> Figure {
     let stood = runs().filter(|(_, run)| !run.fell).map(|(f1_hz, run)| [f1_hz, run.value]);
     distance.series.push(Series::points("run that stands", 0, stood));
     for (style, label, fell) in [(0, "run that stands", false), (FALL_STYLE, "run that falls", true)] {
-        let of = runs().filter(|(_, run)| run.fell == fell).map(|(f1_hz, run)| [f1_hz, run.tilt_at_impulse_rad]);
+        let of = runs().filter(|(_, run)| run.fell == fell);
+        let of = of.filter_map(|(f1_hz, run)| Some([f1_hz, run.tilt_at_impulse_rad?]));
         tilt.series.push(Series::points(label, style, of));
     }
     share.series.push(Series::points("share", 2, F1_HZ.map(|f1_hz| [f1_hz, stand_share(&at(f1_hz))])));

@@ -288,18 +288,16 @@ fn run_table(results: &ReproduceResults, caption: &str, group: impl Fn(&RunResul
         Table::new(format!("{caption} Values, speed and ranges are means of the runs that stand."), columns);
     for (name, runs) in groups {
         let stood: Vec<_> = runs.iter().filter(|run| !run.fell).collect();
-        let mean = |of: &dyn Fn(&RunResult) -> f64| {
-            Cell::optional(Sample::of(stood.iter().map(|run| of(run))).map(|sample| sample.mean), 3)
-        };
-        let all = |of: &dyn Fn(&RunResult) -> f64| Sample::of(runs.iter().map(|run| of(run))).map(|sample| sample.mean);
+        let mean_of = |values: &mut dyn Iterator<Item = f64>| Sample::of(values).map(|sample| sample.mean);
+        let mean = |of: &dyn Fn(&RunResult) -> f64| Cell::optional(mean_of(&mut stood.iter().map(|run| of(run))), 3);
         table.rows.push(vec![
             Cell::text(name),
             Cell::count(runs.len()),
             Cell::count(runs.len() - stood.len()),
-            Cell::optional(all(&|run| f64::from(run.jumps)), 1),
+            Cell::optional(mean_of(&mut runs.iter().map(|run| f64::from(run.jumps))), 1),
             mean(&|run| run.value),
             mean(&|run| run.period_s.map_or(f64::NAN, |period_s| run.value / period_s)),
-            Cell::optional(all(&|run| run.tilt_at_impulse_rad), 3),
+            Cell::optional(mean_of(&mut runs.iter().filter_map(|run| run.tilt_at_impulse_rad)), 3),
             mean(&|run| run.roll_range_rad),
             mean(&|run| run.pitch_range_rad),
         ]);

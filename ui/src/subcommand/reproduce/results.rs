@@ -79,7 +79,8 @@ pub struct RunResult {
     pub value: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured: Option<MeasuredJump>,
-    pub tilt_at_impulse_rad: f64,
+    /// None without an impulse; results of earlier versions have 0 there.
+    pub tilt_at_impulse_rad: Option<f64>,
     pub roll_range_rad: f64,
     pub pitch_range_rad: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -201,11 +202,10 @@ impl ReproduceResults {
         }
         for run in &mut reduced.runs {
             (run.measured, run.effort, run.cause) = (None, None, None);
-            for value in
-                [&mut run.value, &mut run.tilt_at_impulse_rad, &mut run.roll_range_rad, &mut run.pitch_range_rad]
-            {
+            for value in [&mut run.value, &mut run.roll_range_rad, &mut run.pitch_range_rad] {
                 *value = six_digits(*value);
             }
+            run.tilt_at_impulse_rad = run.tilt_at_impulse_rad.map(six_digits);
         }
         reduced
     }

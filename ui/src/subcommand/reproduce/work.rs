@@ -143,7 +143,7 @@ impl Workplace {
             period_s: (spec.jumps > 1).then(|| jump.period_s()),
             value: 0.0,
             measured: None,
-            tilt_at_impulse_rad: 0.0,
+            tilt_at_impulse_rad: None,
             roll_range_rad: 0.0,
             pitch_range_rad: 0.0,
             effort: None,

@@ -34,7 +34,7 @@ pub fn continuous(results: &ReproduceResults) -> Vec<PaperClaim> {
         results.runs_of(|job| job.configuration == ContinuousLow && job.point == point)
     };
     let by_f1: Vec<(f64, Vec<&RunResult>)> = F1_HZ.iter().map(|&f1_hz| (f1_hz, at(f1_hz))).collect();
-    let tilt = |runs: &[&RunResult]| mean(runs.iter().map(|run| run.tilt_at_impulse_rad));
+    let tilt = |runs: &[&RunResult]| mean(runs.iter().filter_map(|run| run.tilt_at_impulse_rad));
     let more = by_f1.first().zip(by_f1.last()).is_some_and(|((_, slow), (_, fast))| tilt(fast) > tilt(slow));
     let [fast, twist] = [ContinuousFast, ContinuousTwist]
         .map(|configuration| results.runs_of(|job| job.configuration == configuration && job.point == RunPoint::First));
@@ -113,7 +113,7 @@ pub fn rough_terrain(results: &ReproduceResults) -> Vec<PaperClaim> {
     let [added_on, added_off] = [true, false].map(|vmc| on(RoughTerrain, vmc));
     let [paper_on, paper_off] = [true, false].map(|vmc| on(RoughTerrainPaper, vmc));
     let often = |runs: &[&RunResult]| !runs.is_empty() && 5 * falls(runs) >= 4 * runs.len();
-    let tilt = |runs: &[&RunResult]| mean(runs.iter().map(|run| run.tilt_at_impulse_rad));
+    let tilt = |runs: &[&RunResult]| mean(runs.iter().filter_map(|run| run.tilt_at_impulse_rad));
     let flat = mean(on(RoughTerrainFlat, true).iter().map(|run| run.value));
     let rough = mean(stood(&added_on).map(|run| run.value));
     let time = |runs: &[&RunResult]| spread(runs.iter().filter_map(|run| run.fall_time_s), 1, "s");
