@@ -3,7 +3,7 @@
 use super::objective;
 use super::rollout::Rollout;
 use crate::robot::Robot;
-use crate::telemetry::{TrialEnd, TrialSpec};
+use crate::telemetry::{CommandRefusal, TrialEnd, TrialSpec};
 use crate::trial::MeasuredJump;
 
 /// Result of one run of a point.
@@ -37,6 +37,16 @@ impl EvaluatedRun {
         self.end == TrialEnd::Settled
     }
 
+    /// Whether the trial began. One that did not is worth 0, as a fall is.
+    pub fn begun(&self) -> bool {
+        !matches!(self.end, TrialEnd::Refused(_) | TrialEnd::NotReady(_))
+    }
+
+    /// Whether the trial began, and the robot does not stand still at the end.
+    pub fn fell(&self) -> bool {
+        self.begun() && !self.stood()
+    }
+
     /// Whether the robot bounced on, and the rule of the task judges that.
     pub fn bounced(&self) -> bool {
         self.stood() && self.cause != objective::suggest(&self.end).1
@@ -57,18 +67,27 @@ pub fn evaluate<R: Robot>(rollout: &mut Rollout<R>, spec: &TrialSpec) -> Evaluat
     let starts: Vec<f64> =
         objective::impulse_edges(ticks, true).map(|index| objective::tilt_rad(&ticks[index])).collect();
     let value = measured.as_ref().and_then(|measured| measured.measured_value);
-    let (_, cause) = objective::suggest_measured(&end, measured.as_ref(), spec.bounce);
+    let (_, mut cause) = objective::suggest_measured(&end, measured.as_ref(), spec.bounce);
+    let jumps = objective::impulse_edges(ticks, false).count() as u32;
+    let fall_time_s = (matches!(end, TrialEnd::Fell(_)) || objective::trips_limit(&end))
+        .then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s));
+    let [roll_range_rad, pitch_range_rad] = if ticks.is_empty() { [0.0; 2] } else { [range(0), range(1)] };
+    // A failsafe that trips in the first tick changes the mode before the trial is requested.
+    if end == TrialEnd::Refused(CommandRefusal::Mode)
+        && let Some(tripped) = rollout.last_transition_cause()
+    {
+        cause = format!("not begun: {tripped}");
+    }
     EvaluatedRun {
         seed: spec.seed,
-        fall_time_s: (matches!(end, TrialEnd::Fell(_)) || objective::trips_limit(&end))
-            .then(|| ticks.last().map_or(0.0, |tick| tick.trial_time_s)),
-        jumps: objective::impulse_edges(ticks, false).count() as u32,
+        fall_time_s,
+        jumps,
         value: value.filter(|_| end == TrialEnd::Settled).unwrap_or(0.0),
         cause,
         measured,
         tilt_at_impulse_rad: (!starts.is_empty()).then(|| starts.iter().sum::<f64>() / starts.len() as f64),
-        roll_range_rad: if ticks.is_empty() { 0.0 } else { range(0) },
-        pitch_range_rad: if ticks.is_empty() { 0.0 } else { range(1) },
+        roll_range_rad,
+        pitch_range_rad,
         end,
     }
 }

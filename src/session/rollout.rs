@@ -29,6 +29,11 @@ impl<R: Robot> Rollout<R> {
         &self.ticks
     }
 
+    /// Cause of the last change of mode in the last trial; none if the mode did not change.
+    pub fn last_transition_cause(&self) -> Option<&str> {
+        self.transitions.last().map(|(_, transition)| transition.cause.as_str())
+    }
+
     /// Ticks of the last trial, countdown included, which may be taken, and its changes of mode with their times on the ticks'
     /// clock, ns.
     pub fn recorded(&mut self) -> (&mut Vec<Tick>, &[(u64, Transition)]) {

@@ -255,3 +255,19 @@ fn a_run_without_an_impulse_has_no_tilt_at_one() {
     let row: Vec<&str> = table.lines().find(|line| line.starts_with("on ")).unwrap().split_whitespace().collect();
     assert_eq!(row[3..], ["0.0", "(0.0)", "-", "-", "-", "-"], "{table}");
 }
+
+/// Regression: it was a fall, "not begun: not in this mode, after 0 jumps".
+#[test]
+fn a_run_that_did_not_begin_names_the_failsafe_and_is_no_fall() {
+    let folder = with_noisy_joints();
+    let arguments = ["--point", "f0=1.3,Fx=40,Fz=210", "--config", folder.path().to_str().unwrap(), "--seeds", "0-1"];
+    for run in runs(&[&arguments[..], &["--json"]].concat()) {
+        assert_eq!((&run["begun"], &run["fell"], &run["value"]), (&false.into(), &false.into(), &0.0.into()), "{run}");
+        let cause = run["cause"].as_str().unwrap();
+        assert!(cause.starts_with("not begun: ") && cause.contains("rad/s exceeds"), "{cause}");
+    }
+    let table = String::from_utf8(evaluate(&arguments).stdout).unwrap();
+    let row: Vec<&str> = table.lines().find(|line| line.starts_with("on ")).unwrap().split_whitespace().collect();
+    assert_eq!(row[..3], ["on", "2", "0"], "{table}");
+    assert!(table.contains("not begun, no falls: 2 runs") && !table.contains("after 0 jumps"), "{table}");
+}

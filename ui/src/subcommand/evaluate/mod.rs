@@ -132,7 +132,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
             }
         };
         let result = evaluate(rollout, &run.spec);
-        let fell = usize::from(!result.stood());
+        let fell = usize::from(result.fell());
         let falls = falls.fetch_add(fell, Ordering::Relaxed) + fell;
         progress.add(1, &format!("{falls} falls"));
         Ok(result)
@@ -291,7 +291,8 @@ fn line(variant: &Variant, friction: f64, run: &EvaluatedRun) -> serde_json::Val
     json!({
         "variant": named,
         "seed": run.seed,
-        "fell": !run.stood(),
+        "begun": run.begun(),
+        "fell": run.fell(),
         "cause": cause,
         "fall_time_s": run.fall_time_s,
         "jumps": run.jumps,

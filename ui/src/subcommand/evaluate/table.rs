@@ -1,4 +1,4 @@
-//! The table of an evaluation: a row per variant, and the falls below it.
+//! The table of an evaluation: a row per variant, and below it the falls and the runs that did not begin.
 
 use quadfrog::session::evaluation::EvaluatedRun;
 use quadfrog::telemetry::TrialSpec;
@@ -39,7 +39,7 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
             on_off(variant.vmc),
             friction(&variant.friction.map_or_else(String::new, |friction| format!("{friction}"))),
             all.len(),
-            all.len() - stood.len(),
+            all.iter().filter(|run| run.fell()).count(),
             mean_and_spread(all.iter().map(|run| f64::from(run.jumps)), 1),
             mean_and_spread(stood.iter().map(|run| run.value), 3),
             mean_and_spread(all.iter().filter_map(|run| run.tilt_at_impulse_rad), 3),
@@ -49,7 +49,13 @@ pub fn table(spec: &TrialSpec, robot: &str, point: &ParameterValues, runs: &[(Va
         for run in all.iter().filter(|run| !run.stood() || run.bounced()) {
             let time = run.fall_time_s.map_or(String::new(), |time| format!(" at {time:.2} s"));
             let EvaluatedRun { seed, cause, jumps, .. } = run;
-            text += &format!("     seed {seed}: {cause}{time}, after {}\n", counted(*jumps as usize, "jump"));
+            let after =
+                if run.begun() { format!(", after {}", counted(*jumps as usize, "jump")) } else { String::new() };
+            text += &format!("     seed {seed}: {cause}{time}{after}\n");
+        }
+        let not_begun = all.iter().filter(|run| !run.begun()).count();
+        if not_begun > 0 {
+            text += &format!("     not begun, no falls: {}\n", counted(not_begun, "run"));
         }
     }
     text += "Means, of several runs with standard deviations; value, roll and pitch of the runs that stood.\n";
