@@ -341,11 +341,20 @@ fn a_stop_that_the_gate_would_cut_is_refused() {
 /// Regression: such values were reported in line 1.
 #[test]
 fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
-    refuses(
-        "optimize.toml",
-        "# mine\n\ntrials = -3\n",
-        &[":3", "`trials` = -3", "a whole number from 0 to 4294967295"],
-    );
+    refuses("optimize.toml", "# mine\n\ntrials = -3\n", &[":3", "`trials` = -3", "a whole number from 1 to 1000000"]);
+    // Regression: the range was that of the kind, which starts at 0, and not that of the key.
+    for (keys, expected) in [
+        (
+            "[terrain.blocks]\ncount = -3\n",
+            "`terrain.blocks.count` = -3: invalid value: integer `-3`, expected a whole number from 1 to 10000",
+        ),
+        (
+            "[sensors]\ndelay_ms = -1\n",
+            "`sensors.delay_ms` = -1: invalid value: integer `-1`, expected a whole number from 0 to 20",
+        ),
+    ] {
+        refuses("simulator.toml", keys, &[":2", expected]);
+    }
     refuses("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n", &[":3", "tasks.forward.stance_m", "0.14"]);
     refuses("optimize.toml", "[sampler]\nkind = \"cma\"\n", &[":2", "sampler.kind", "cma"]);
 }

@@ -22,6 +22,7 @@ use crate::robot::Leg;
 use crate::robot::description::{RobotDescription, RobotFiles, read_text};
 use crate::sim::SimConfig;
 use crate::sim::ensemble::EnsembleSettings;
+use crate::sim::ranges::NumberRange;
 use crate::trial::{Backend, GAIN_UNITS, HopEnvelope, ParameterInfo, ParameterValues, Task, parameter_unit};
 
 /// A text laid over the file of a name.
@@ -394,7 +395,7 @@ fn parse<T: DeserializeOwned>(
     table.clone().try_into().map_err(|error: toml::de::Error| {
         let key = key_of(&error);
         let value = lookup(table, &key).map(toml::Value::to_string).unwrap_or_default();
-        origin.refuse(&key, value, without_type_names(error.message()))
+        origin.refuse(&key, value, without_type_names(error.message(), ranges::of_key(name, &key).0))
     })
 }
 
@@ -406,9 +407,14 @@ fn key_of(error: &toml::de::Error) -> String {
     key.unwrap_or_default().to_owned()
 }
 
-/// Returns a decoder's message with the names of Rust types replaced.
-fn without_type_names(message: &str) -> String {
-    let whole = |most: u64| format!("a whole number from 0 to {most}");
+/// Returns a decoder's message with the names of Rust types replaced: by the whole numbers of the key's range, if it has one.
+fn without_type_names(message: &str, range: Option<&NumberRange>) -> String {
+    let whole = |most: u64| match range {
+        Some(range) => {
+            format!("a whole number from {} to {}", range.least.max(0.0).ceil(), range.most.min(most as f64))
+        }
+        None => format!("a whole number from 0 to {most}"),
+    };
     let Some((found, kind)) = message.rsplit_once("expected ") else { return message.to_owned() };
     let kind = match kind {
         "u8" => whole(u8::MAX.into()),
