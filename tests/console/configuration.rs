@@ -271,6 +271,14 @@ fn a_robot_is_begun_from_its_urdf() {
         &["notes.md: ", "; give the URDF of a robot"],
     );
     assert_shows(&program.refused(&["init", "none.urdf", "robots/none"]), &["none.urdf", "cannot be read"]);
+    // Regression: the URDF and the new robot.toml had one name, and the folder could not be written.
+    fs::copy(&urdf, program.path("robot.toml")).unwrap();
+    let message = program.refused(&["init", "robot.toml", "robots/two"]);
+    assert_shows(&message, &["robot.toml: is the name of the file that init writes", "give the URDF another one"]);
+    // Regression: an empty URDF of a model was refused without the remedy that `init` gives.
+    program.write("robots/alpha/a1.urdf", "");
+    let message = program.refused(&["evaluate", "--model", "robots/alpha", "--point", "f0=1.3,Fx=40,Fz=210"]);
+    assert_shows(&message, &["robots/alpha/a1.urdf: ", "; give the URDF of a robot"]);
 }
 
 /// Regressions: a robot without a name was accepted, and one in the present folder was named `robot`.

@@ -10,6 +10,7 @@ use quadfrog::robot::{GRAVITY, JointCommand, Leg, MotorCommand, Placement, Robot
 use quadfrog::sim::{SimConfig, Simulator};
 
 const GO1: &str = include_str!("../../robots/go1/go1.urdf");
+const A1: &str = include_str!("../../robots/a1/a1.urdf");
 const GO1_TOML: &str = include_str!("../../robots/go1/robot.toml");
 
 /// The message about a robot with these two files.
@@ -281,4 +282,39 @@ fn a_joint_that_follows_another_is_refused_and_its_friction_is_named_as_unused()
         assert!(missing.contains("[actuator.hardware_like]"), "{missing}");
     }
     assert!(!drafted("damping=\"0\" friction=\"0\"").contains("<dynamics>"));
+}
+
+/// Regression: a joint that no leg reaches could name links that do not exist.
+#[test]
+fn a_joint_between_links_that_do_not_exist_is_refused() {
+    for (parent, child, missing) in
+        [("no", "none", "its parent, the link no,"), ("trunk", "none", "its child, the link none,")]
+    {
+        let joint = format!(
+            "<joint name=\"j\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{child}\"/></joint></robot>"
+        );
+        let message = refusal("</robot>", &joint);
+        assert!(message.contains(&format!("joint j: {missing} does not exist; add the link")), "{message}");
+    }
+}
+
+/// Regression: the message was about the mass of the link `world`.
+#[test]
+fn a_link_of_the_world_above_the_trunk_is_refused_with_the_remedy() {
+    let world = "<link name=\"world\"/><joint name=\"base\" type=\"floating\"><parent link=\"world\"/><child link=\"trunk\"/></joint></robot>";
+    let message = refusal("</robot>", world);
+    assert!(message.contains("link world: has no mass, and the floating joint base carries the robot"), "{message}");
+    assert!(message.contains("remove this link and its joint, or make the joint fixed"), "{message}");
+}
+
+/// Regression: the calf weighed its foot alone, and nothing said so.
+#[test]
+fn a_calf_without_a_mass_of_its_own_is_named_in_a_draft() {
+    let missing = |urdf: &str| Draft::of_urdf("a1", Path::new("a1.urdf"), urdf).unwrap().missing.join("\n");
+    assert!(!missing(A1).contains("mass of"));
+    let start = A1.find("<link name=\"FR_calf\">").unwrap();
+    let (inertial, end) =
+        (start + A1[start..].find("<inertial>").unwrap(), start + A1[start..].find("</inertial>").unwrap());
+    let without = A1[..inertial].to_owned() + &A1[end + "</inertial>".len()..];
+    assert!(missing(&without).contains("mass of FR_calf: without <inertial>"), "{}", missing(&without));
 }

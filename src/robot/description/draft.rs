@@ -70,6 +70,12 @@ impl Draft {
                     .to_owned(),
             );
         }
+        if !parts.massless_links.is_empty() {
+            missing.push(format!(
+                "mass of {}: without <inertial> each weighs only the links that are fixed to it",
+                parts.massless_links.join(", ")
+            ));
+        }
         if !parts.unused_dynamics.is_empty() {
             missing.push(format!(
                 "<dynamics> (joints: {}) is not taken from the URDF; give dry_friction_nm and viscous_friction_nm_s of \

@@ -24,6 +24,8 @@ pub(super) struct UrdfContents {
     pub links: Vec<LinkFrame>,
     /// Joints of the legs whose damping or friction is not zero in the URDF, which has no effect.
     pub unused_dynamics: Vec<String>,
+    /// Links of the legs that have no mass themselves: their bodies weigh what is fixed to them.
+    pub massless_links: Vec<String>,
 }
 
 /// Tolerance for lengths and directions that must be equal or zero, m: the precision of a drawing.
@@ -53,7 +55,8 @@ struct UrdfDocument<'a> {
 pub(super) fn parse(file: &Path, text: &str) -> Result<UrdfContents, DescriptionError> {
     let syntax = |reason: String| DescriptionError::Syntax { file: file.to_owned(), reason };
     urdf_checks::check_text(text).map_err(syntax)?;
-    let robot = urdf_rs::read_from_string(text).map_err(|e| syntax(e.to_string()))?;
+    let robot =
+        urdf_rs::read_from_string(text).map_err(|error| syntax(format!("{error}; give the URDF of a robot")))?;
     urdf_checks::check_robot(&robot).map_err(|(element, problem, remedy)| DescriptionError::Invalid {
         file: file.to_owned(),
         element,
@@ -68,11 +71,9 @@ impl<'a> UrdfDocument<'a> {
         Err(DescriptionError::Invalid { file: self.file.to_owned(), element: element.to_owned(), problem, remedy })
     }
 
-    fn link(&self, name: &str) -> Result<&'a Link, DescriptionError> {
-        match self.robot.links.iter().find(|link| link.name == name) {
-            Some(link) => Ok(link),
-            None => self.invalid(&format!("link {name}"), "a joint names it, but it does not exist".into(), "add it"),
-        }
+    /// Returns the link at an end of a joint, which [`urdf_checks::check_robot`] has found.
+    fn link(&self, name: &str) -> &'a Link {
+        self.robot.links.iter().find(|link| link.name == name).expect("the links of all joints exist")
     }
 
     /// Returns the only link without a parent.
@@ -86,7 +87,18 @@ impl<'a> UrdfDocument<'a> {
     }
 
     fn contents(&self) -> Result<UrdfContents, DescriptionError> {
-        let trunk = self.fixed_links(self.root()?)?;
+        let root = self.root()?;
+        let floating = |joint: &&Joint| {
+            joint.parent.link == root.name
+                && matches!(joint.joint_type, JointType::Floating)
+                && root.inertial.mass.value == 0.0
+        };
+        if let Some(joint) = self.robot.joints.iter().find(floating) {
+            let problem = format!("has no mass, and the floating joint {} carries the robot", joint.name);
+            let remedy = "the root is the trunk: remove this link and its joint, or make the joint fixed";
+            return self.invalid(&format!("link {}", root.name), problem, remedy);
+        }
+        let trunk = self.fixed_links(root)?;
         if trunk.joints.len() != 4 {
             let found = trunk.joints.iter().map(|(joint, _)| joint.name.as_str()).collect::<Vec<_>>().join(", ");
             let problem = format!("{} moving joints on the trunk ({found})", trunk.joints.len());
@@ -129,8 +141,19 @@ impl<'a> UrdfDocument<'a> {
                 && joint.dynamics.as_ref().is_some_and(|part| part.damping != 0.0 || part.friction != 0.0)
         };
         let unused_dynamics = self.robot.joints.iter().filter(has_dynamics).map(|joint| joint.name.clone()).collect();
-        let trunk = trunk.body;
-        Ok(UrdfContents { trunk, legs, leg_geometry, limits, imu_origin, joint_names, links, unused_dynamics })
+        let bodies = legs.iter().flat_map(|leg| &leg.bodies).map(|body| body.name.clone());
+        let massless_links = bodies.filter(|name| self.link(name).inertial.mass.value == 0.0).collect();
+        Ok(UrdfContents {
+            trunk: trunk.body,
+            legs,
+            leg_geometry,
+            limits,
+            imu_origin,
+            joint_names,
+            links,
+            unused_dynamics,
+            massless_links,
+        })
     }
 
     /// Returns all links but `root`, each once and after its parent.
@@ -182,7 +205,7 @@ impl<'a> UrdfDocument<'a> {
             limits.max_position[i] = joint.limit.upper;
             limits.max_torque[i] = joint.limit.effort;
             limits.max_velocity[i] = joint.limit.velocity;
-            let links = self.fixed_links(self.link(&joint.child.link)?)?;
+            let links = self.fixed_links(self.link(&joint.child.link))?;
             spheres = links.spheres;
             match (part, &links.joints[..]) {
                 (0 | 1, &[(next, next_origin)]) => (joint, origin) = (next, next_origin),
@@ -343,7 +366,7 @@ impl<'a> UrdfDocument<'a> {
         for joint in self.robot.joints.iter().filter(|joint| joint.parent.link == link.name) {
             let origin = pose * isometry(&joint.origin);
             match joint.joint_type {
-                JointType::Fixed => self.add(self.link(&joint.child.link)?, origin, links)?,
+                JointType::Fixed => self.add(self.link(&joint.child.link), origin, links)?,
                 _ => links.joints.push((joint, origin)),
             }
         }

@@ -69,7 +69,7 @@ fn tag_length(tag: &str) -> usize {
     tag.bytes().position(ends).unwrap_or(tag.len())
 }
 
-/// Checks the number of links, that names are unique and joints form a tree, and every number that is used.
+/// Checks the number of links, that names are unique, joints join links that exist and form a tree, and every number that is used.
 pub(super) fn check_robot(robot: &Robot) -> Result<(), Refusal> {
     let links = robot.links.len();
     if links > MOST_LINKS {
@@ -88,6 +88,15 @@ pub(super) fn check_robot(robot: &Robot) -> Result<(), Refusal> {
     if let Some(name) = repeated(robot.joints.iter().map(|joint| &joint.child.link)) {
         let problem = "several joints have it as their child".to_owned();
         return Err((format!("link {name}"), problem, "joints form a tree: leave one of them"));
+    }
+    let names: HashSet<&String> = robot.links.iter().map(|link| &link.name).collect();
+    for joint in &robot.joints {
+        for (end, link) in [("parent", &joint.parent.link), ("child", &joint.child.link)] {
+            if !names.contains(link) {
+                let problem = format!("its {end}, the link {link}, does not exist");
+                return Err((format!("joint {}", joint.name), problem, "add the link, or remove the joint"));
+            }
+        }
     }
     robot.links.iter().try_for_each(check_link)?;
     robot.joints.iter().try_for_each(check_joint)

@@ -6,7 +6,7 @@ use crate::put_line;
 use clap::Args;
 use quadfrog::config::{Config, write_new_files};
 use quadfrog::printable::shell_word;
-use quadfrog::robot::description::{DescriptionError, Draft, read_text};
+use quadfrog::robot::description::{Draft, read_text};
 use quadfrog::trial::{Backend, Task};
 
 use super::arguments::{load_config, printable_name};
@@ -30,13 +30,13 @@ pub fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let InitArguments { urdf, folder, name } = arguments;
     let config = load_config(None)?;
     let refuse = |reason: &dyn std::fmt::Display| Failure::input(format!("{}: {reason}", urdf.display()));
+    if urdf.file_name().is_some_and(|name| name == "robot.toml") {
+        return Err(refuse(&"is the name of the file that init writes beside the URDF; give the URDF another one"));
+    }
     let text =
         read_text(urdf).map_err(|error| refuse(&format!("cannot be read: {error}; give the URDF of a robot")))?;
     let name = name.clone().map_or_else(|| name_of(folder), Ok)?;
-    let draft = Draft::of_urdf(&name, urdf, &text).map_err(|error| match error {
-        DescriptionError::Syntax { .. } => Failure::input(format!("{error}; give the URDF of a robot")),
-        error => Failure::input(error),
-    })?;
+    let draft = Draft::of_urdf(&name, urdf, &text).map_err(Failure::input)?;
     let urdf_name = urdf.file_name().unwrap_or_default();
     let files = [(Path::new("robot.toml"), &draft.toml), (Path::new(urdf_name), &text)];
     for path in write_new_files(folder, &files)? {
