@@ -1,12 +1,13 @@
 //! Texts of 80 columns and 24 rows that a reader without the manual understands.
 
 use crate::support::{Console, assert_shows, line_with, proposal, session, tick, trial};
+use quadfrog::optimize::ask::SamplerKind;
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::telemetry::{Mode, Phase};
 use quadfrog::trial::{
-    Approval, ExperimentStage, FallRisk, FixedParameter, JudgedBy, ParameterInsight, PointRecord, ProposalInsight,
-    ProposalSource, ProposedParameter, QueuedPoint, REMOVED, SearchStatus, SearchedParameter, Task, TrialRecord,
-    Verdict,
+    Approval, ExperimentStage, FallRisk, FixedParameter, JudgedBy, ParameterInfo, ParameterInsight, PointRecord,
+    PredictedTrial, ProposalInsight, ProposalSource, ProposedParameter, QueuedPoint, REMOVED, SearchStatus,
+    SearchedParameter, Task, TrialRecord, Verdict,
 };
 use quadfrog_console::message::Msg;
 
@@ -439,4 +440,68 @@ fn columns_stay_where_they_are_behind_large_numbers_of_trials() {
             assert!(values[0].is_some() && values.iter().all(|value| *value == values[0]), "{values:?}\n{screen}");
         }
     }
+}
+
+/// Regression: at 120 columns Live cut the confidence of the leading point, 97 %, to `leads, 9`.
+#[test]
+fn the_confidence_of_the_leading_point_is_whole_at_every_width() {
+    for (confidence, shown) in [(0.97, "97 %"), (0.9999, "100 %")] {
+        let console = repeated("rad", Some(confidence));
+        for columns in 80..=200 {
+            let screen = console.screen(columns, 40);
+            assert_shows(&line_with(&screen, "*#12 "), &[shown]);
+        }
+    }
+}
+
+/// Regression: at 80x24 no view showed the standings of a running confirmation; Live said that they have no room.
+#[test]
+fn the_standings_of_a_running_confirmation_are_shown_at_80x24() {
+    let mut console = repeated("m", Some(0.97));
+    let mut changed = proposal(21, 0);
+    changed.gains[..3].iter_mut().for_each(|gain| gain.value *= 1.1);
+    console.record(Record::Proposal(changed));
+    console.stage(ExperimentStage::Proposed, 21);
+    console.record(Record::Search(SearchStatus { budget: 20, confirming: Some(7), ..SearchStatus::default() }));
+    assert_shows(&console.screen(80, 24), &["confirming the best: 7 left", "2 points have no room: view 3"]);
+    console.press(&["3"]);
+    let screen = console.screen(80, 24);
+    assert_shows(&screen, &["Repeated points", "2/2 landed  0.442 m ±0.050  leads, 97 %", "9/10 landed"]);
+    // The panels whose place it takes have no legend.
+    assert!(!screen.contains("TPE") && !screen.contains("g good"), "{screen}");
+    console.record(Record::Search(SearchStatus { budget: 20, ..SearchStatus::default() }));
+    assert_shows(&console.screen(80, 24), &["TPE"]);
+}
+
+/// Regression: at 80x24 the importances of `gp` had no room beside the title, and the legend explained them all the same.
+#[test]
+fn the_importance_of_a_parameter_has_room_at_80x24_and_its_legend_only_where_it_is_shown() {
+    let with = |names: &[&str]| {
+        let mut console = Console::ready();
+        let parameters = session().parameters;
+        let parameters = names.iter().map(|name| ParameterInfo { name: (*name).into(), ..parameters[0].clone() });
+        let info = SessionInfo { sampler: Some(SamplerKind::Gp), parameters: parameters.collect(), ..session() };
+        console.record(Record::Session(info));
+        console.judged(4);
+        let insight = |name: &&str| ParameterInsight {
+            name: (*name).into(),
+            proposed: 1.25,
+            importance: Some(0.46),
+            ..ParameterInsight::default()
+        };
+        let predicted = vec![PredictedTrial { trial: 0, value: 0.4, deviation: 0.02 }];
+        let parameters = names.iter().map(insight).collect();
+        console.record(Record::Insight(ProposalInsight { trial: 4, parameters, predicted, ..Default::default() }));
+        console.press(&["3"]);
+        console
+    };
+    let three = with(&["f0", "Fx", "k_att"]);
+    for columns in 80..=200 {
+        let screen = three.screen(columns, 24);
+        assert_eq!(screen.matches("importance 46 %").count(), 3, "{screen}");
+        assert_shows(&screen, &["importance: for best tenth"]);
+    }
+    assert_shows(&three.screen(200, 60), &["Predicted J over f0", "importance 46 %"]);
+    let screen = with(&["f0", "Fx", "Fz", "kp", "kd", "k_att"]).screen(80, 24);
+    assert!(!screen.contains("importance"), "{screen}");
 }

@@ -9,7 +9,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::dots::DotGrid;
-use super::draw::{cell_at, heading, truncate};
+use super::draw::{cell_at, heading, heading_width, truncate};
 use super::parameter_axes::ParameterAxes;
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
@@ -20,10 +20,13 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     let insight = session.insight.as_ref().filter(of_proposal);
     let modelled = insight.is_some_and(|insight| !insight.predicted.is_empty());
     let parameter = insight.and_then(|insight| insight.parameters.iter().find(|p| p.name == info.name));
-    let importance = parameter.and_then(|parameter| parameter.importance);
-    let aside = importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0));
-    let body =
-        heading(frame, area, theme, &title(insight, modelled, session.info.sampler, &info.name, area.width), &aside);
+    let aside = parameter.map_or(String::new(), importance);
+    let titles = titles(insight, modelled, session.info.sampler, &info.name);
+    let fits = |(least, title): &&(u16, String)| {
+        *least <= area.width && heading_width(title, &aside) <= usize::from(area.width)
+    };
+    let title = titles.iter().find(fits).map_or(&info.name, |(_, title)| title);
+    let body = heading(frame, area, theme, title, &aside);
     let drawn = match insight {
         Some(insight) if modelled => render_prediction(frame, body, session, insight, info, theme),
         _ => parameter.is_some_and(|parameter| render_densities(frame, body, session, parameter, info, theme)),
@@ -39,24 +42,38 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, info: &Para
     }
 }
 
-/// The longest title for which there is room.
-fn title(
+/// The importance of a parameter in words; empty where it is not known.
+fn importance(parameter: &ParameterInsight) -> String {
+    parameter.importance.map_or(String::new(), |share| format!("importance {:.0} %", share * 100.0))
+}
+
+/// Whether a panel of `width` columns names the importance of a parameter.
+pub fn has_importance(parameter: &ParameterInsight, width: u16) -> bool {
+    let aside = importance(parameter);
+    !aside.is_empty() && heading_width(&parameter.name, &aside) <= usize::from(width)
+}
+
+/// The titles, the longest first, each with the columns from which it is taken.
+fn titles(
     insight: Option<&ProposalInsight>,
     modelled: bool,
     sampler: Option<SamplerKind>,
     name: &str,
-    width: u16,
-) -> String {
-    let trial = insight.map(|insight| insight.trial);
+) -> Vec<(u16, String)> {
     let is_tpe = sampler.is_none_or(|kind| kind == SamplerKind::Tpe);
     let of = if is_tpe { "TPE" } else { sampler.map_or("", SamplerKind::name) };
-    match (trial, modelled, width) {
-        (Some(trial), false, 58..) if is_tpe => format!("TPE densities of {name} (#{trial})"),
-        (Some(trial), false, 36..) => format!("{of} {name} (#{trial})"),
-        (_, false, _) => format!("{of} {name}"),
-        (Some(trial), true, 58..) => format!("Predicted J over {name} (#{trial}): mean and deviation"),
-        (_, true, 36..) => format!("Predicted J over {name}"),
-        (_, true, _) => format!("Model {name}"),
+    let short = |of: &str| (0, format!("{of} {name}"));
+    match insight.map(|insight| insight.trial) {
+        Some(trial) if modelled => vec![
+            (58, format!("Predicted J over {name} (#{trial}): mean and deviation")),
+            (36, format!("Predicted J over {name}")),
+            short("Model"),
+        ],
+        Some(trial) => {
+            let long = if is_tpe { "TPE densities of" } else { of };
+            vec![(58, format!("{long} {name} (#{trial})")), (36, format!("{of} {name} (#{trial})")), short(of)]
+        }
+        None => vec![short(of)],
     }
 }
 

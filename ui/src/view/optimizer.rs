@@ -1,6 +1,6 @@
 //! View 3, Optimizer: objective over trials and parameters, the sampler's reasons, landing places.
 
-use quadfrog::trial::{ParameterInfo, ProposalInsight, SimulatorComparison, Verdict};
+use quadfrog::trial::{ExperimentStage, ParameterInfo, ProposalInsight, SimulatorComparison, Verdict};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -13,11 +13,20 @@ use super::{densities, objective, points};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
+/// Rows from which the repeated points have some of their own.
+const REPEATS_FROM_ROWS: u16 = 30;
+
 pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &Theme) {
-    let repeated = points::lines(session, theme, usize::from(area.width));
-    // Repeats have rows of their own where there are any to spare.
-    let repeat_rows = if repeated.is_empty() || area.height < 30 { 0 } else { repeated.len().min(5) as u16 + 1 };
-    let legend_rows = legend(session, theme, area.width);
+    let (repeated, _) = points::lines(session, theme, usize::from(area.width));
+    let roomy = area.height >= REPEATS_FROM_ROWS;
+    let repeat_rows = if repeated.is_empty() || !roomy { 0 } else { repeated.len().min(5) as u16 + 1 };
+    // In few rows the result of a confirmation stands in place of the sampler's reasons.
+    let confirmed = session.confirming().is_some() || session.stage_is(ExperimentStage::Finished);
+    let in_place_of_reasons = !repeated.is_empty() && !roomy && confirmed;
+    let parameters = &session.info.parameters;
+    let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(area);
+    let reasons_width = columns(area).iter().map(|panel| panel.width).min().filter(|_| !in_place_of_reasons);
+    let legend_rows = legend(session, theme, area.width, reasons_width);
     let [upper, repeats, scatters, why, legend] = Layout::vertical([
         Constraint::Fill(1),
         Constraint::Length(repeat_rows),
@@ -26,31 +35,30 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
         Constraint::Length(legend_rows.len() as u16),
     ])
     .areas(area);
+    let repeats = if in_place_of_reasons { why } else { repeats };
     let [history, _, landings] =
         Layout::horizontal([Constraint::Fill(3), Constraint::Length(2), Constraint::Fill(2)]).areas(upper);
     frame.render_widget(Paragraph::new(legend_rows), legend);
     objective::render(frame, history, session, theme);
     render_landings(frame, landings, session, theme);
-    if repeat_rows > 0 {
+    if repeats.height > 0 {
         let aside = format!("landed/repeats, mean, std{}", points::star(session));
         let body = heading(frame, repeats, theme, "Repeated points", &aside);
-        let lines = points::within(repeated, theme, 0, usize::from(body.height));
+        let lines = points::within(repeated, theme, 0, usize::from(body.height), "");
         frame.render_widget(Paragraph::new(lines), body);
     }
-    let parameters = &session.info.parameters;
     if parameters.is_empty() {
         return;
     }
-    let columns = |area: Rect| Layout::horizontal(vec![Constraint::Fill(1); parameters.len()]).spacing(2).split(area);
     let (above, below) = (columns(scatters), columns(why));
     for (index, info) in parameters.iter().enumerate() {
         let info = session.with_shown_range(info);
         render_scatter(frame, above[index], session, theme, &info);
-        if session.simulator().is_none() {
+        if session.simulator().is_none() && !in_place_of_reasons {
             densities::render(frame, below[index], session, &info, theme);
         }
     }
-    if let Some(simulator) = session.simulator() {
+    if let Some(simulator) = session.simulator().filter(|_| !in_place_of_reasons) {
         render_simulator(frame, why, simulator, &session.info.unit, theme);
     }
 }
@@ -104,10 +112,12 @@ fn render_scatter(frame: &mut Frame, area: Rect, session: &SessionModel, theme: 
     }
 }
 
-/// The signs of all panels, each whole, in as many lines as they need.
-fn legend(session: &SessionModel, theme: &Theme, width: u16) -> Vec<Line<'static>> {
+/// The signs of all panels, each whole, in as many lines as they need. `reasons_width` are the columns of the narrowest panel of the
+/// sampler's reasons; none where there is none.
+fn legend(session: &SessionModel, theme: &Theme, width: u16, reasons_width: Option<u16>) -> Vec<Line<'static>> {
     let modelled = session.insight.as_ref().is_some_and(|insight| !insight.predicted.is_empty());
-    let densities = session.insight.as_ref().is_some_and(|insight| insight.parameters.iter().any(|p| !p.at.is_empty()));
+    let explained = session.insight.as_ref().filter(|_| reasons_width.is_some());
+    let densities = explained.is_some_and(|insight| insight.parameters.iter().any(|p| !p.at.is_empty()));
     let mut items = Vec::new();
     let void = if width >= 100 { "void, without J" } else { "void" };
     for (verdict, text) in
@@ -122,7 +132,7 @@ fn legend(session: &SessionModel, theme: &Theme, width: u16) -> Vec<Line<'static
     }
     items.push(("*", Role::Good, "best"));
     // Without an open proposal the reasons of the last one stay, with its line.
-    let reasons = densities || modelled && session.insight.as_ref().is_some_and(|i| !i.parameters.is_empty());
+    let reasons = densities || modelled && explained.is_some_and(|insight| !insight.parameters.is_empty());
     let line = match (session.open_proposal().is_some(), reasons, modelled) {
         (true, _, false) => Some((Role::Key, "proposal")),
         (true, _, true) => Some((Role::Key, "proposal, deviation")),
@@ -141,8 +151,10 @@ fn legend(session: &SessionModel, theme: &Theme, width: u16) -> Vec<Line<'static
         items.extend([("g", Role::Good, "good"), ("r", Role::SeriesB, "rest")]);
     }
     items.push((theme.line(), Role::Quiet, "best so far"));
-    let important = |insight: &ProposalInsight| insight.parameters.iter().any(|p| p.importance.is_some());
-    if session.simulator().is_none() && session.insight.as_ref().is_some_and(important) {
+    let importance = |insight: &ProposalInsight| {
+        insight.parameters.iter().any(|p| reasons_width.is_some_and(|width| densities::has_importance(p, width)))
+    };
+    if session.simulator().is_none() && explained.is_some_and(importance) {
         items.push(("importance:", Role::Quiet, "for best tenth"));
     }
     let (mut lines, mut line) = (Vec::new(), Line::from(" "));

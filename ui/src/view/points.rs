@@ -7,28 +7,31 @@ use super::draw::{number, span};
 use crate::model::session::SessionModel;
 use crate::theme::{Role, Theme};
 
-/// Columns from which a line names its numbers itself; narrower ones stand below a line that does.
+/// Columns from which a line may name its numbers itself; others stand below a line that does.
 pub const WORDS_FROM: usize = 40;
 
 /// Columns of the number of a point, and of mean, standard deviation and the space behind them, in a narrow line.
 const NUMBER_WIDTH: usize = 6;
 const MEAN_WIDTH: usize = 13;
 
-/// A line for each repeated point, best mean first.
-pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
+/// A line for each repeated point, best mean first, and whether each names its numbers itself: where all have room.
+pub fn lines(session: &SessionModel, theme: &Theme, width: usize) -> (Vec<Line<'static>>, bool) {
     let mut points: Vec<&PointRecord> = session.trials.points.iter().filter(|point| !point.trials.is_empty()).collect();
     points.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    let line = if width >= WORDS_FROM { line } else { narrow_line };
-    points.into_iter().map(|point| line(session, theme, point)).collect()
+    let whole: Vec<_> = points.iter().map(|point| line(session, theme, point)).collect();
+    match width >= WORDS_FROM && whole.iter().all(|line| line.width() <= width) {
+        true => (whole, true),
+        false => (points.iter().map(|point| narrow_line(session, theme, point)).collect(), false),
+    }
 }
 
 /// The lines of [`lines`] below one that says what they are, and in few columns names their numbers; none without points.
 pub fn titled_lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<Line<'static>> {
-    let lines = lines(session, theme, width);
+    let (lines, in_words) = lines(session, theme, width);
     if lines.is_empty() {
         return lines;
     }
-    let title = match width >= WORDS_FROM {
+    let title = match in_words {
         true => format!(" repeated points{}", star(session)),
         false => {
             // Without a confidence the line of the leading point says it.
@@ -42,8 +45,14 @@ pub fn titled_lines(session: &SessionModel, theme: &Theme, width: usize) -> Vec<
 }
 
 /// The lines as far as `rows` rows have room: whole points below the `titles` lines that name them, and the number of those that are
-/// left out.
-pub fn within(lines: Vec<Line<'static>>, theme: &Theme, titles: usize, rows: usize) -> Vec<Line<'static>> {
+/// left out, with the place where they are, `elsewhere`.
+pub fn within(
+    lines: Vec<Line<'static>>,
+    theme: &Theme,
+    titles: usize,
+    rows: usize,
+    elsewhere: &str,
+) -> Vec<Line<'static>> {
     if lines.len() <= rows {
         return lines;
     }
@@ -51,8 +60,8 @@ pub fn within(lines: Vec<Line<'static>>, theme: &Theme, titles: usize, rows: usi
     // A row names those that are left out; the title stands over a point or not at all.
     let shown = rows.saturating_sub(titles + 1);
     let sign = match shown {
-        0 => format!(" {points} points have no room"),
-        shown => format!(" {} more have no room", points - shown),
+        0 => format!(" {points} points have no room{elsewhere}"),
+        shown => format!(" {} more have no room{elsewhere}", points - shown),
     };
     let kept = if shown == 0 { 0 } else { titles + shown };
     lines.into_iter().take(kept).chain([Line::from(span(theme, Role::Quiet, sign))]).take(rows).collect()

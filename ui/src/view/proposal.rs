@@ -26,7 +26,8 @@ pub fn render(frame: &mut Frame, area: Rect, model: &Model) {
     let rows = usize::from(body.height).saturating_sub(usize::from(!points.is_empty()));
     let mut lines = within(&lines, &model.theme, usize::from(body.width), rows);
     let room = usize::from(body.height).saturating_sub(lines.len());
-    lines.extend(points::within(points, &model.theme, 1, room));
+    let elsewhere = format!(": view {}", model.keymap.key(Action::OptimizerView));
+    lines.extend(points::within(points, &model.theme, 1, room, &elsewhere));
     frame.render_widget(Paragraph::new(lines), body);
 }
 
