@@ -323,3 +323,26 @@ fn the_arming_checks_name_the_key_that_arms() {
         assert_shows(&last.join(" "), &["A arms.", "q close."]);
     }
 }
+
+/// Regression: the keys of a jump in an empty table were those of the simulator, and a dialog said of `g` that it cancels.
+#[test]
+fn the_hints_of_a_real_robot_are_the_keys_that_it_takes() {
+    let mut console = on_hardware(Console::ready());
+    for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
+        let screen = console.screen(columns, rows);
+        assert_shows(&screen, &["A arm: type stand, it stands up"]);
+        assert_shows(&screen, &["g approve the jump; y: the area is clear; g: countdown and jump"]);
+    }
+    console.press(&["?"]);
+    assert_shows(
+        &console.screen(120, 60),
+        &["approve the jump; y: the area is clear; again after 0.8 s: countdown and jump"],
+    );
+    assert_shows(&console.screen(120, 60), &["arm: type the letters that it asks for, the robot stands up"]);
+    console.press(&["Esc", "g"]);
+    assert_shows(&console.screen(80, 24), &["Enter, or any key but g     y the area is clear"]);
+    assert_shows(&console.next_step(), &["Type y if the area is clear (trial #0). Any key but g cancels."]);
+    // On the simulator they are shorter.
+    let console = Console::ready();
+    assert_shows(&console.screen(80, 24), &["A arm: it stands up ", "g approve the jump; again after 0.8 s"]);
+}

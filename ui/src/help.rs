@@ -47,10 +47,14 @@ pub fn lines(model: &Model) -> Vec<Line<'static>> {
     lines
 }
 
-/// The text of an action; of the key that stops and quits, where nothing can be stopped, without STOP.
+/// The text of an action; of the key that stops and quits, where nothing can be stopped, without STOP, and of those that arm and
+/// approve a real robot with its confirmations.
 pub fn text_of(info: &ActionInfo, model: &Model) -> &'static str {
+    let hardware = model.session.info.is_hardware();
     match info.action {
         Action::Interrupt if !model.can_stop() => "twice within 2 s: quit",
+        Action::Arm if hardware => "arm: type the letters that it asks for, the robot stands up",
+        Action::Approve if hardware => "approve the jump; y: the area is clear; again after 0.8 s: countdown and jump",
         _ => info.help,
     }
 }

@@ -14,14 +14,14 @@ use crate::theme::{Role, Theme};
 
 /// The two answers; Cancel is the default and comes first.
 fn answers(theme: &Theme, key: &str, text: &str) -> Line<'static> {
-    answers_or("Cancel", theme, key, text)
+    answers_or(("Cancel", "any other key"), theme, key, text)
 }
 
-/// The two answers with another word for the default.
-fn answers_or(default: &str, theme: &Theme, key: &str, text: &str) -> Line<'static> {
+/// The two answers with another word for the default, and the keys that give it beside Enter.
+fn answers_or((default, keys): (&str, &str), theme: &Theme, key: &str, text: &str) -> Line<'static> {
     Line::from(vec![
         span(theme, Role::Selected, format!(" {default} ")),
-        span(theme, Role::Quiet, " Enter, or any other key     "),
+        span(theme, Role::Quiet, format!(" Enter, or {keys}     ")),
         span(theme, Role::Key, key.to_owned()),
         span(theme, Role::Text, format!(" {text}")),
     ])
@@ -105,7 +105,8 @@ pub fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec
     lines.push(Line::default());
     let area_asked = model.session.info.is_hardware() && !area_clear;
     let mut answer = match area_asked {
-        true => answers(&model.theme, "y", "the area is clear"),
+        // Once more, the approving key is only too early.
+        true => answers_or(("Cancel", &format!("any key but {key}")), &model.theme, "y", "the area is clear"),
         false => answers(&model.theme, &key, "jump"),
     };
     if !area_asked && !waited {
@@ -245,7 +246,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
             let lines = vec![
                 Line::from(format!("To compare the best points takes {least}: {few} cannot confirm any of them.")),
                 Line::default(),
-                answers_or("Back to the field", &model.theme, "y", "repeat all the same"),
+                answers_or(("Back to the field", "any other key"), &model.theme, "y", "repeat all the same"),
             ];
             ("So few repeats?", lines)
         }
@@ -283,7 +284,7 @@ pub fn confirm(model: &Model, question: &Question) -> (&'static str, Vec<Line<'s
                 Line::from(format!("Trial #{trial}: {} {unit} by hand, but {measured}.", six_digits(*value))),
                 Line::from("An accepted trial reports the value by hand to the optimizer."),
                 Line::default(),
-                answers_or("Back to the field", &model.theme, "y", "use it"),
+                answers_or(("Back to the field", "any other key"), &model.theme, "y", "use it"),
             ];
             ("Is this value right?", lines)
         }

@@ -176,7 +176,7 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
     if model.replay.is_some() || model.session.info.observe {
         return frame.render_widget(Line::from(span(theme, Role::Quiet, "     no trial yet")), area);
     }
-    let step = |number: &str, keys: &[(Action, &'static str)]| {
+    let step = |number: &str, keys: &[(Action, &str)]| {
         let mut spans = vec![span(theme, Role::Quiet, format!("   {number} "))];
         for (action, text) in keys {
             spans.push(span(theme, Role::Key, model.keymap.all_keys(*action)));
@@ -185,10 +185,22 @@ fn render_empty(frame: &mut Frame, area: Rect, model: &Model) {
         Line::from(spans)
     };
     let judge = [(Action::Accept, "accept"), (Action::Fall, "fall"), (Action::Void, "void"), (Action::Rerun, "re-run")];
-    let arm = if model.session.jumps_without_question() { "arm: it stands up and jumps" } else { "arm: it stands up" };
+    let session = &model.session;
+    let arm = match session.info.is_hardware() {
+        true => format!("arm: type {}, it stands up", session.arming_confirmation()),
+        false if session.jumps_without_question() => "arm: it stands up and jumps".to_owned(),
+        false => "arm: it stands up".to_owned(),
+    };
+    let approve = match session.info.is_hardware() {
+        true => {
+            let again = model.keymap.key(Action::Approve);
+            format!("approve the jump; y: the area is clear; {again}: countdown and jump")
+        }
+        false => Action::Approve.info().help.to_owned(),
+    };
     let lines = vec![
-        step("before", &[(Action::Arm, arm), (Action::Override, "override"), (Action::Skip, "skip")]),
-        step("jump  ", &[(Action::Approve, "approve the jump; again after 0.8 s: countdown and jump")]),
+        step("before", &[(Action::Arm, &arm), (Action::Override, "override"), (Action::Skip, "skip")]),
+        step("jump  ", &[(Action::Approve, &approve)]),
         step("after ", &[&judge[..], &[(Action::Undo, "undo")]].concat()),
         step(
             "always",

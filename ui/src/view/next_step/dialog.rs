@@ -28,7 +28,7 @@ pub(super) fn question(model: &Model, dialog: &Dialog) -> String {
     let close = format!("{} close.", model.keymap.closing_keys());
     match dialog {
         Dialog::Approve { trial, area_clear: false, .. } if model.session.info.is_hardware() => {
-            format!("Type y if the area is clear (trial #{trial}). Any other key cancels.")
+            format!("Type y if the area is clear (trial #{trial}). Any key but {} cancels.", key(Action::Approve))
         }
         Dialog::Approve { trial, .. } => {
             format!("Press {} again to jump (trial #{trial}). Any other key cancels.", key(Action::Approve))
