@@ -193,10 +193,16 @@ impl ProposalSource {
         self.into()
     }
 
-    /// Returns the name with the number of the trial that is repeated, if there is one: `re-run of #3`.
+    /// Returns the name with the number of the trial that is repeated, if there is one: `re-run of #3`; with values of the operator
+    /// `changed re-run of #3`.
     pub fn with_parent(self, parent: Option<u32>) -> String {
-        let parent = parent.map_or(String::new(), |parent| format!(" of #{parent}"));
-        format!("{}{parent}", self.name())
+        match (self, parent) {
+            (ProposalSource::Operator, Some(parent)) => {
+                format!("changed {} of #{parent}", ProposalSource::Rerun.name())
+            }
+            (_, Some(parent)) => format!("{} of #{parent}", self.name()),
+            (_, None) => self.name().to_owned(),
+        }
     }
 }
 

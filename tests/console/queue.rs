@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::pty::Session;
 use crate::skip::skip;
-use crate::support::{Console, assert_shows, line_with, session as session_info};
+use crate::support::{Console, assert_shows, line_with, proposal, session as session_info};
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::trial::{ParameterInfo, ProposalSource, QueuedPoint, SearchStatus};
 
@@ -401,4 +401,30 @@ fn a_number_of_the_queue_stays_on_the_line_of_its_unit() {
         let screen = console.screen(columns, 24);
         assert_shows(&screen, &["kp 450.0 N m / s/rad", "kp_joint 60.00 N m / s/rad", "kd_joint 0.800 N m / s/rad"]);
     }
+}
+
+/// Regression: the list showed the stored values of the proposal where the operator had changed them.
+#[test]
+fn the_queue_shows_the_values_that_will_run() {
+    let mut console = Console::ready();
+    let point = QueuedPoint {
+        trial: 0,
+        source: ProposalSource::Rerun,
+        parent: Some(3),
+        parameters: vec![("f0".into(), 1.299), ("Fx".into(), 75.0), ("Fz".into(), 250.0)].into(),
+        ..QueuedPoint::default()
+    };
+    let next = QueuedPoint { trial: 1, ..point.clone() };
+    console.record(Record::Search(SearchStatus { queue: vec![point, next], ..SearchStatus::default() }));
+    let mut changed = proposal(0, 1);
+    (changed.source, changed.parent) = (ProposalSource::Operator, Some(3));
+    (changed.parameters[0].value, changed.parameters[0].proposed) = (1.4, 1.299);
+    changed.gains[0].value = 450.0;
+    console.record(Record::Proposal(changed));
+    console.press(&["N"]);
+    let screen = console.screen(120, 40);
+    let row = line_with(&screen, "│ #0 ");
+    assert_shows(&row, &["changed re-run of #3", "f0 1.400 Hz, Fx 75.00 N, Fz 250.0 N, kp 450.0 N/m"]);
+    assert!(!row.contains("kd"), "{row}");
+    assert_shows(&line_with(&screen, "│ #1 "), &["re-run of #3", "f0 1.299 Hz, Fx 75.00 N, Fz 250.0 N"]);
 }

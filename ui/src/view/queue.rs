@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use quadfrog::trial::{ExperimentStage, QueuedPoint};
+use quadfrog::trial::{ExperimentStage, Proposal, ProposedParameter, QueuedPoint};
 use ratatui::text::Line;
 
 use super::draw::span;
@@ -68,9 +68,24 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
     (lines, of_selected)
 }
 
+/// Returns the point that the open proposal runs in place of the queued one: with the operator's changes.
+fn proposed(proposal: &Proposal) -> QueuedPoint {
+    let value = |p: &ProposedParameter| (p.name.clone(), p.value);
+    let changed = |gain: &&ProposedParameter| gain.value != gain.proposed;
+    QueuedPoint {
+        trial: proposal.trial,
+        source: proposal.source,
+        parent: proposal.parent,
+        parameters: proposal.parameters.iter().map(value).collect(),
+        gains: proposal.gains.iter().filter(changed).map(value).collect(),
+    }
+}
+
 /// Returns a point in words, with the digits and units of the card: `#8  re-run of #3  f0 1.300 Hz, Fx 90.00 N, Fz 240.0 N`.
 fn described(model: &Model, point: &QueuedPoint) -> String {
     let info = &model.session.info;
+    let changed = model.session.open_proposal().filter(|proposal| proposal.trial == point.trial).map(proposed);
+    let point = changed.as_ref().unwrap_or(point);
     let source = point.source.with_parent(point.parent);
     let words = point.in_words(info.parameters.iter().chain(&info.gains));
     // A number stays on the line of its unit.
