@@ -473,6 +473,55 @@ fn the_standings_of_a_running_confirmation_are_shown_at_80x24() {
     assert_shows(&console.screen(80, 24), &["TPE"]);
 }
 
+/// Regression: below 60x20, where no dialog is drawn, values were typed into a form that nothing showed.
+#[test]
+fn a_terminal_that_shows_no_dialog_opens_no_field() {
+    let finished = || {
+        let mut console = Console::ready();
+        console.judged(5);
+        console.stage(ExperimentStage::Finished, 5);
+        console
+    };
+    let review = || Console::review(Mode::Ready, Verdict::Accept);
+    let tripped = || {
+        let mut console = Console::review(Mode::Ready, Verdict::Fall);
+        console.record(Record::Trial(tripped_trial()));
+        console
+    };
+    let cases: [(&dyn Fn() -> Console, &str); 7] = [
+        (&review, "="),
+        (&review, "m"),
+        (&Console::ready, "o"),
+        (&finished, "K"),
+        (&finished, "C"),
+        (&tripped, "v"),
+        (&Console::ready, ":"),
+    ];
+    for (console, key) in cases {
+        for (columns, rows, opens) in [(40, 10, false), (59, 20, false), (60, 20, true)] {
+            let mut console = console();
+            console.update(Msg::Resize(columns, rows));
+            console.press(&[key]);
+            assert_eq!(console.model.dialog.is_some(), opens, "{key} at {columns}x{rows}: {}", console.said());
+            if !opens {
+                let refused =
+                    format!("{key} is not possible: enlarge the terminal to 60x20: what is typed must be visible");
+                assert_eq!(console.said(), refused);
+            }
+        }
+    }
+    // A value that is not typed reaches nobody.
+    let mut console = review();
+    console.update(Msg::Resize(40, 10));
+    assert_eq!(console.requests(&["=", "0", ".", "5", "Enter"]), []);
+}
+
+/// A trial that tripped a limit: its void verdict needs a reason.
+fn tripped_trial() -> TrialRecord {
+    let row = trial(0, None, Some(Verdict::Fall));
+    TrialRecord { cause: "limit: roll 1.200 rad exceeds 1.000 rad".into(), ..row }
+}
+
 /// Regression: at 80x24 the importances of `gp` had no room beside the title, and the legend explained them all the same.
 #[test]
 fn the_importance_of_a_parameter_has_room_at_80x24_and_its_legend_only_where_it_is_shown() {

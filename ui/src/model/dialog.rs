@@ -308,6 +308,11 @@ impl Dialog {
         }
     }
 
+    /// Whether it is a field or a form, with values that the operator must see.
+    pub fn holds_values(&self) -> bool {
+        self.takes_text() || matches!(self, Dialog::Override(_))
+    }
+
     /// Whether keys are text here.
     pub fn takes_text(&self) -> bool {
         matches!(self, Dialog::Field { .. } | Dialog::Palette { .. })

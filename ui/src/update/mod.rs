@@ -16,9 +16,11 @@ use quadfrog::printable::is_unprintable;
 use quadfrog::recording::record::LogLevel;
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::Mode;
+use ratatui::layout::Size;
 
 use crate::action::Action;
 use crate::keymap::Key;
+use crate::layout::{COMPACT_COLUMNS, COMPACT_ROWS, compact_areas};
 use crate::legal::{may_request, view_keys_keep_countdown};
 use crate::message::{Effect, Msg};
 use crate::model::Model;
@@ -35,6 +37,7 @@ pub use request::{reply, say};
 /// Folds one message into the model.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let was_open = model.dialog.is_some();
+    let pressed = if let Msg::Key(key) = msg { Some(key) } else { None };
     let effects = fold(model, msg);
     let playing = model.replay.as_ref().is_some_and(|replay| replay.playing);
     // Frozen charts beside another place of the recording would be taken for those of that place.
@@ -43,8 +46,21 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     }
     if model.dialog.is_some() && !was_open {
         model.dialog_opened_at = model.clock;
+        if let Some(key) = pressed {
+            close_unseen_field(model, key);
+        }
     }
     effects
+}
+
+/// Closes a field or a form that a key has opened where the terminal has no room to show it.
+fn close_unseen_field(model: &mut Model, key: Key) {
+    let drawn = compact_areas(Size::from(model.size)).is_some();
+    if !drawn && model.dialog.take_if(|dialog| dialog.holds_values()).is_some() {
+        let enlarge =
+            format!("enlarge the terminal to {COMPACT_COLUMNS}x{COMPACT_ROWS}: what is typed must be visible");
+        reply(model, LogLevel::Warning, format!("{key} is not possible: {enlarge}"));
+    }
 }
 
 fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
