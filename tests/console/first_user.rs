@@ -1,11 +1,11 @@
 //! Answers and screens that a user of the README alone took for wrong.
 
-use crate::support::{Console, assert_shows, line_with, proposal, trial};
-use quadfrog::recording::record::{Record, StageRecord, Transition};
+use crate::support::{Console, assert_shows, line_with, proposal, session, trial};
+use quadfrog::recording::record::{Record, SessionInfo, StageRecord, Transition};
 use quadfrog::session::operator_request::OperatorRequest;
 use quadfrog::telemetry::{FallCause, Mode, Snapshot, TransitionCause};
 use quadfrog::trial::{
-    ExperimentStage, FixedParameter, PointRecord, ProposalSource, QueuedPoint, SKIPPED, SearchStatus,
+    Approval, ExperimentStage, FixedParameter, PointRecord, ProposalSource, QueuedPoint, SKIPPED, SearchStatus,
     SearchedParameter, TrialRecord, Verdict,
 };
 use quadfrog_console::message::{Effect, Msg};
@@ -405,4 +405,20 @@ fn the_dialog_that_fixes_a_parameter_says_which_trials_use_it_up() {
     }));
     console.press(&["Esc"]);
     assert_shows(&console.screen(80, 24), &["fixed at 75.00, 3 more"]);
+}
+
+/// Regression: under `--approve falls-only` the first repeat jumped a second after Enter; the dialog said that each is approved.
+#[test]
+fn the_dialog_of_a_confirmation_says_that_its_jumps_follow_without_a_question() {
+    let begins = "the jumps follow without a question, the first at once if the robot stands";
+    for (approve, asks) in [(Approval::Each, true), (Approval::FallsOnly, false), (Approval::Auto, false)] {
+        let mut console = Console::ready();
+        console.record(Record::Session(SessionInfo { approve, ..session() }));
+        console.judged(5);
+        console.press(&["K"]);
+        let screen = joined(&console.screen(80, 24));
+        assert_eq!(screen.contains("each repeat is approved"), asks, "{screen}");
+        assert_eq!(screen.contains(begins), !asks, "{screen}");
+        assert_shows(&screen, &["not count for the budget"]);
+    }
 }

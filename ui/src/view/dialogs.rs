@@ -334,10 +334,12 @@ fn field(
                 least if least > 0 => format!("; to compare them takes {}", counted(least, "repeat")),
                 _ => String::new(),
             };
+            let begins = match model.session.jumps_without_question() {
+                true => "the jumps follow without a question, the first at once if the robot stands, and do not",
+                false => "each repeat is approved, and does not",
+            };
             let last = last_verdict_stays(model).map_or(String::new(), |sentence| format!(" {sentence}"));
-            format!(
-                "The best points run again until one leads{needed}; each repeat is approved, and does not count for the budget.{last}"
-            )
+            format!("The best points run again until one leads{needed}; {begins} count for the budget.{last}")
         }
         Purpose::LogSearch => "empty: all lines".to_owned(),
         Purpose::Seek if model.space_bar_is_text() => {
