@@ -261,7 +261,9 @@ impl ArmingChecklist {
             StopTest::Pressed => (ArmingCheckState::Waiting, "pressed, not acknowledged"),
             StopTest::Passed => (ArmingCheckState::Passed, "pressed and acknowledged"),
         };
-        self.item(ArmingCheck::StopTested, state, found.to_owned(), "press STOP, then acknowledge".to_owned())
+        // In DAMPED and FAULT, which damp already, STOP has no effect that could be seen.
+        let needed = "press STOP while DISARMED, then acknowledge".to_owned();
+        self.item(ArmingCheck::StopTested, state, found.to_owned(), needed)
     }
 
     fn item(&self, check: ArmingCheck, state: ArmingCheckState, found: String, needed: String) -> ArmingCheckRecord {

@@ -809,3 +809,38 @@ fn a_connection_that_cannot_be_seen_is_confirmed_before_a_real_robot_is_armed() 
     let answer = session.request(OperatorRequest::Arm);
     assert!(answer.accepted, "{answer:?}");
 }
+
+/// Regressions: a STOP in DAMPED or FAULT left no line in the log, and the arming check that it does not meet did not say so.
+#[test]
+fn a_stop_of_a_damped_robot_is_logged_and_tests_nothing() {
+    let logged = |session: &Session, mode: &str| {
+        let text = format!("STOP while {mode}: the robot stays damped");
+        session.records.iter().filter(|it| matches!(it, Record::Log(line) if line.message == text)).count()
+    };
+    let mut session = Session::hardware();
+    session.operator.stop.set();
+    session.ticks(5);
+    assert_eq!((session.body.mode(), logged(&session, "DAMPED")), (Mode::Damped, 0), "the change of mode reports it");
+    for pressed in 1..=2 {
+        session.operator.stop.set();
+        session.ticks(20);
+        assert_eq!(logged(&session, "DAMPED"), pressed);
+    }
+    assert!(session.request(OperatorRequest::Acknowledge).accepted);
+
+    let mut session = Session::hardware();
+    session.robot.tamper = |state| state.motor_temperature_c[3] = 90.0;
+    session.ticks(10);
+    session.operator.stop.set();
+    session.ticks(5);
+    assert_eq!((session.body.mode(), logged(&session, "FAULT")), (Mode::Fault, 1));
+    session.robot.tamper = |_| {};
+    session.ticks(10);
+    assert!(session.request(OperatorRequest::Acknowledge).accepted);
+    session.ticks(1500);
+    let check = session.list().into_iter().find(|item| item.check == ArmingCheck::StopTested).unwrap();
+    assert_eq!(check.state, ArmingCheckState::Waiting);
+    assert_eq!(check.needed, "press STOP while DISARMED, then acknowledge");
+    session.test_stop();
+    assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
+}

@@ -110,6 +110,8 @@ pub struct Supervisor {
     inhibited: Option<String>,
     warned_ns: Option<u64>,
     ended: Option<Ended>,
+    /// Number of STOPs that a change of mode or the log reports.
+    stops_reported: u64,
     /// The observer who has set STOP last, in words, and when.
     observer_stop: Option<(String, u64)>,
     unmeasured: VecDeque<TrialTicks>,
@@ -170,6 +172,7 @@ impl Supervisor {
             inhibited: None,
             warned_ns: None,
             ended: None,
+            stops_reported: 0,
             observer_stop: None,
             unmeasured: VecDeque::new(),
             recorder_error: None,
@@ -251,6 +254,7 @@ impl Supervisor {
         while let Ok(event) = self.control.events.pop() {
             self.event(event, time_ns);
         }
+        self.report_stop(time_ns);
         let reboots = self.control.counters.read().link.map_or(0, |link| link.reboots);
         if self.checklist.robot_restarted(reboots) {
             let message = "the robot restarted: confirm low-level mode and the clear area again".to_owned();
@@ -359,9 +363,10 @@ impl Supervisor {
 
     /// STOP by the session at its end: the last reported mode may be old, and a command that energises the robot may still be
     /// in the ring. A robot that was never taken control of receives nothing.
-    pub fn stop(&self) {
+    pub fn stop(&mut self) {
         if !self.observe && self.mode.commanded() {
             self.control.stop.set();
+            self.stops_reported += 1;
         }
     }
 
@@ -392,6 +397,9 @@ impl Supervisor {
                 self.releasing = false;
                 if to.commanded() {
                     self.control_wanted = None;
+                }
+                if cause == TransitionCause::Stop {
+                    self.stops_reported = self.control.stop.count();
                 }
                 self.checklist.mode_changed(from, to, &cause);
                 self.record_checklist();

@@ -1,4 +1,5 @@
-//! State between the trials: reasons against the next trial, the arming checklist, the release by an observer.
+//! State between the trials: reasons against the next trial, a STOP of a damped robot, the arming checklist, the release by an
+//! observer.
 
 use super::Supervisor;
 use crate::recording::record::{ArmingCheckRecord, LogLevel, Record, Stamped};
@@ -29,6 +30,16 @@ impl Supervisor {
         if let Some(warning) = self.control.readiness.read().warning.filter(|_| due) {
             self.warned_ns = Some(time_ns);
             self.log(LogLevel::Warning, warning.to_string(), time_ns);
+        }
+    }
+
+    /// Logs a STOP that changes no mode, because the robot is damped already.
+    pub(super) fn report_stop(&mut self, time_ns: u64) {
+        let stops = self.control.stop.count();
+        if stops > self.stops_reported && matches!(self.mode, Mode::Damped | Mode::Fault) {
+            self.stops_reported = stops;
+            let message = format!("STOP while {}: the robot stays damped", self.mode.name());
+            self.log(LogLevel::Info, message, time_ns);
         }
     }
 
