@@ -282,3 +282,22 @@ fn the_best_trial_of_a_recording_is_laid_under_the_charts_from_the_start() {
     session.send("q");
     assert!(session.wait().success());
 }
+
+/// Regression: the panel had the final verdicts above a table at the playhead, without a word.
+#[test]
+fn the_panel_of_two_trials_says_that_its_rows_are_of_the_end() {
+    for (size, title) in
+        [((80, 24), "Two trials, at the end ─"), ((120, 40), "Two trials, at the end of the recording ─")]
+    {
+        let mut session = paused(size, &[]);
+        go(&mut session, 2, 0.1);
+        session.send("|");
+        session.wait_for(&["Which trial beside #2?"]);
+        session.send("5\r");
+        session.wait_for(&["A #2 line, B #5 dotted", title]);
+        session.send(")");
+        session.wait_until("the same rows in the table", || session.screen().contains("Two trials ─"));
+        session.send("q");
+        assert!(session.wait().success());
+    }
+}

@@ -377,6 +377,21 @@ fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() 
     assert!(later.contains("reported to the optimizer") && !later.contains("once it cannot"), "{later}");
 }
 
+/// Regression: the replay of a finished study said of a value that it is reported once its verdict cannot be undone.
+#[test]
+fn a_replay_says_of_no_value_that_it_waits_for_the_optimizer() {
+    let mut console = Console::ready();
+    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
+    console.stage(ExperimentStage::Review, 0);
+    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
+    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Finished, trial: 1, can_undo: true, jumps: 0 }));
+    console.update(Msg::Replay(ReplayStatus::default()));
+    console.press(&["2", "Enter"]);
+    let screen = console.screen(120, 40);
+    assert_shows(&screen, &["0.4000 m, reported to the optimizer"]);
+    assert!(!screen.contains("once it cannot"), "{screen}");
+}
+
 /// Regression: battery, temperature and clock of a silent robot stayed on the screen as if they were of now.
 #[test]
 fn a_silent_robot_has_no_battery_temperature_and_clock() {

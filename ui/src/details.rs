@@ -66,7 +66,7 @@ fn details(model: &Model, trial: &TrialRecord, overrides: &Overrides) -> Vec<(St
         row("note", trial.note.clone());
     }
     let use_of = |value: f64| match trial.verdict {
-        Some(_) if session.undoable() == Some(trial.trial) => {
+        Some(_) if session.undoable() == Some(trial.trial) && model.replay.is_none() => {
             format!("{value:.4} {unit}, reported to the optimizer once it cannot be undone")
         }
         Some(_) => format!("{value:.4} {unit}, reported to the optimizer"),

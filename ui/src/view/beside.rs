@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
-use super::draw::{heading, measured_number, number, sign, span, truncate};
+use super::draw::{columns, heading, measured_number, number, sign, span, truncate};
 use crate::column::Column;
 use crate::message::ComparedTrial;
 use crate::model::Model;
@@ -52,7 +52,7 @@ fn parameters(comparison: &Comparison) -> Vec<&str> {
 
 pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Model) {
     let (theme, Comparison { a, b, .. }) = (&model.theme, comparison);
-    let body = heading(frame, area, theme, "Two trials", "");
+    let body = heading(frame, area, theme, title(comparison, model, area.width), "");
     let width = (usize::from(body.width).saturating_sub(LABEL + 1) / 2).min(12);
     let line = |label: &str, cells: [(String, Role); 2]| {
         let mut spans = vec![span(theme, Role::Quiet, format!(" {label:<LABEL$}"))];
@@ -104,6 +104,17 @@ pub fn render(frame: &mut Frame, area: Rect, comparison: &Comparison, model: &Mo
         lines.push(Line::from(span(theme, Role::Quiet, format!(" {left_out} more have no room"))));
     }
     frame.render_widget(Paragraph::new(lines), body);
+}
+
+/// The title; where a row is not that of the table at the playhead, with the time of the rows.
+fn title(comparison: &Comparison, model: &Model, width: u16) -> &'static str {
+    let Comparison { a, b, .. } = comparison;
+    let differs = |trial: &ComparedTrial| trial.row.as_ref() != model.session.trials.records.get(&trial.trial);
+    let titles = match differs(a) || b.recording.is_none() && differs(b) {
+        true => ["Two trials, at the end of the recording", "Two trials, at the end"],
+        false => ["Two trials"; 2],
+    };
+    if columns(titles[0]) <= usize::from(width) { titles[0] } else { titles[1] }
 }
 
 /// The causes of both verdicts in at most `room` lines: of one that is longer than its share the first line, with a sign at its end.
