@@ -9,7 +9,7 @@ use quadfrog::trial::{
     PredictedTrial, ProposalInsight, ProposalSource, ProposedParameter, QueuedPoint, REMOVED, SearchStatus,
     SearchedParameter, Task, TrialRecord, Verdict,
 };
-use quadfrog_console::message::Msg;
+use quadfrog_console::message::{Msg, RejudgeNews};
 
 /// A finished study with two points that were repeated.
 fn repeated(unit: &str, confidence: Option<f64>) -> Console {
@@ -553,4 +553,52 @@ fn the_importance_of_a_parameter_has_room_at_80x24_and_its_legend_only_where_it_
     assert_shows(&three.screen(200, 60), &["Predicted J over f0", "importance 46 %"]);
     let screen = with(&["f0", "Fx", "Fz", "kp", "kd", "k_att"]).screen(80, 24);
     assert!(!screen.contains("importance"), "{screen}");
+}
+
+/// Regression: in few columns the line below the size was cut to `STOP works, no key ar`.
+#[test]
+fn the_lines_of_a_very_narrow_terminal_are_whole() {
+    let console = Console::ready();
+    for columns in 12..60 {
+        let screen = console.screen(columns, 100);
+        let words = screen.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_shows(&words, &["link none: SIM", "STOP works, no key arms or jumps"]);
+    }
+}
+
+/// Regression: the line of the best so far ended one trial before the next best.
+#[test]
+fn the_line_of_the_best_so_far_has_no_gap() {
+    let mut console = Console::ready();
+    console.judged(16);
+    console.press(&["3"]);
+    let screen = console.screen(120, 40);
+    let lines: Vec<Vec<char>> = screen.lines().map(|line| line.chars().take(68).collect()).collect();
+    let top = screen.lines().position(|line| line.contains("over trials")).expect("its heading");
+    let below = screen.lines().position(|line| line.contains("#19")).expect("its numbers");
+    let at = |column: usize, signs: &str| {
+        lines[top + 1..below].iter().any(|line| line.get(column).is_some_and(|cell| signs.contains(*cell)))
+    };
+    let first = (0..68).find(|column| at(*column, "o")).expect("the first accepted trial");
+    let last = (0..68).find(|column| at(*column, "*")).expect("the best");
+    for column in first..=last {
+        assert!(at(column, "─o*"), "nothing in column {column}:\n{screen}");
+    }
+}
+
+/// Regression: the heading of trials that are judged again named the folder `n/examples/hardware_like`.
+#[test]
+fn the_heading_of_trials_judged_again_cuts_a_path_at_a_slash_with_a_sign() {
+    for (configuration, shown) in [
+        ("configurations/examples/hardware_like", "new by ../hardware_like: 0 of 5"),
+        ("examples/strict", "new by examples/strict: 0 of 5"),
+        ("examples/a-very-long-name-of-a-folder", "new by a-very-long-name-of-a-..: 0 of 5"),
+    ] {
+        let mut console = Console::ready();
+        console.judged(5);
+        console.press(&["2"]);
+        let news = RejudgeNews::Begun { configuration: configuration.into(), unit: "m".into(), trials: 5 };
+        console.update(Msg::Rejudged(news));
+        assert_shows(&console.screen(80, 24), &[shown]);
+    }
 }

@@ -4,6 +4,7 @@ use crate::dialogs::long_checks;
 use crate::support::{Console, assert_shows, line_with, session};
 use quadfrog::recording::record::{Record, SessionInfo};
 use quadfrog::trial::{Backend, ProposalSource, QueuedPoint, SearchStatus};
+use quadfrog_console::message::{Mouse, Msg};
 
 /// Regressions: End was refused in the help and, as Home, in the arming checks, and neither was named; after keys beyond the end as many
 /// of the other direction seemed to do nothing.
@@ -64,4 +65,38 @@ fn home_and_end_go_to_the_first_and_the_last_of_the_others() {
     console.press(&["Home", "Up"]);
     assert_shows(&console.screen(80, 24), &["Actions (1 of "]);
     assert!(!last.contains("Actions (1 of "), "{last}");
+}
+
+/// Regression: with the mouse on, the wheel did nothing over the help, details and lists.
+#[test]
+fn the_wheel_scrolls_help_details_and_lists_and_answers_no_question() {
+    let wheel = |console: &mut Console, event| assert_eq!(console.update(Msg::Mouse(event)), []);
+    // The selected row of a list has other colours.
+    let shown = |console: &Console| console.screen(80, 24) + &console.colours(80, 24);
+    let mut console = long_checks();
+    console.judged(4);
+    let point = |trial| QueuedPoint { trial, source: ProposalSource::Operator, ..QueuedPoint::default() };
+    console.record(Record::Search(SearchStatus { queue: (5..9).map(point).collect(), ..SearchStatus::default() }));
+    console.update(Msg::Resize(80, 24));
+    console.press(&["M"]);
+    for keys in [&["?"][..], &["P"], &["N"], &["x"], &["2", "Enter"], &["R"]] {
+        console.press(&["2"]);
+        console.press(keys);
+        let before = shown(&console);
+        assert!(console.model.dialog.is_some(), "{keys:?}: {}", console.said());
+        wheel(&mut console, Mouse::WheelDown);
+        let moved = shown(&console);
+        wheel(&mut console, Mouse::WheelUp);
+        assert_eq!(shown(&console), before, "{keys:?}");
+        // A short page has nothing to scroll.
+        if !keys.contains(&"Enter") && !keys.contains(&"R") {
+            assert_ne!(moved, before, "{keys:?}");
+        }
+        console.press(&["Esc"]);
+    }
+    console.press(&["1", "n"]);
+    let before = shown(&console);
+    assert_shows(&before, &["Skip the proposal?"]);
+    wheel(&mut console, Mouse::WheelDown);
+    assert_eq!(shown(&console), before);
 }

@@ -1,18 +1,26 @@
 //! The mouse: it selects and scrolls. It never commands the robot, since an accidental click is too easy.
 
+use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::layout::Size;
 
+use super::dialog;
 use super::navigate::move_by;
 use super::perform::perform;
+use crate::keymap::Key;
 use crate::layout::{Areas, areas, first_row, tab_at, trial_rows};
 use crate::message::{Effect, Mouse};
+use crate::model::dialog::Dialog;
 use crate::model::{Model, View};
 
 /// Rows that one notch of the wheel moves by.
 const NOTCH: isize = 3;
 
 pub(super) fn handle(model: &mut Model, event: Mouse) -> Vec<Effect> {
-    if !model.mouse || model.dialog.is_some() {
+    if !model.mouse {
+        return Vec::new();
+    }
+    if model.dialog.is_some() {
+        scroll_dialog(model, event);
         return Vec::new();
     }
     match event {
@@ -27,6 +35,24 @@ pub(super) fn handle(model: &mut Model, event: Mouse) -> Vec<Effect> {
         }
     }
     Vec::new()
+}
+
+/// Scrolls a dialog that only shows something, with its keys; a question, a field and a form are left alone.
+fn scroll_dialog(model: &mut Model, event: Mouse) {
+    let pages = matches!(model.dialog, Some(Dialog::Details { .. } | Dialog::LogLine { .. }));
+    let (code, times) = match event {
+        // Up and Down show another trial or line there.
+        Mouse::WheelUp if pages => (KeyCode::PageUp, 1),
+        Mouse::WheelDown if pages => (KeyCode::PageDown, 1),
+        Mouse::WheelUp => (KeyCode::Up, NOTCH),
+        Mouse::WheelDown => (KeyCode::Down, NOTCH),
+        Mouse::Click { .. } => return,
+    };
+    for _ in 0..times {
+        if let Some(dialog) = model.dialog.take_if(|dialog| dialog.only_shows()) {
+            dialog::key(model, dialog, Key::from_event(KeyEvent::from(code)));
+        }
+    }
 }
 
 /// The trial that the view Trials shows in a row of the terminal.

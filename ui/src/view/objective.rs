@@ -67,8 +67,12 @@ pub fn render(frame: &mut Frame, area: Rect, session: &SessionModel, theme: &The
     let bests: Vec<&TrialRecord> = session.trials.best_so_far().collect();
     for (index, trial) in bests.iter().enumerate() {
         let Some(value) = trial.value else { continue };
-        let until = bests.get(index + 1).map_or(last, |next| next.trial);
-        let (from, to) = (column(trial.trial), column(until.max(1) - 1).max(column(trial.trial)));
+        let from = column(trial.trial);
+        let to = match bests.get(index + 1) {
+            Some(next) => column(next.trial).saturating_sub(1),
+            None => column(last.max(1) - 1),
+        }
+        .max(from);
         let line = theme.line().repeat(usize::from(to - from) + 1);
         buffer.set_string(from, row(value), line, theme.style(Role::Quiet));
     }

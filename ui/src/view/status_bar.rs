@@ -355,27 +355,25 @@ pub fn render_small(frame: &mut Frame, area: Rect, model: &Model) {
         (None, true) => format!("link {} ms", model.snapshot.counters.state_age_ms),
         (None, false) => "link none: SIM".to_owned(),
     };
+    let wrapped = |line: Line<'static>| wrap(&line, usize::from(area.width), 1);
     let mut lines = vec![
         Line::from(vec![mode_span(model), Span::raw(" "), backend(model)]),
         match model.can_stop() {
             true => Line::from(vec![span(theme, Role::Alarm, " STOP "), Span::raw(" "), span(theme, Role::Key, keys)]),
             false => Line::from(span(theme, Role::Quiet, "no robot to stop")),
         },
-        Line::from(link),
     ];
+    lines.extend(wrapped(Line::from(link)));
     lines.extend(old(model).map(|old| Line::from(span(theme, Role::Bad, old))));
     if let Some(step) = step_of_small(model) {
-        lines.extend(wrap(&Line::from(span(theme, Role::Key, step)), usize::from(area.width), 1));
+        lines.extend(wrapped(Line::from(span(theme, Role::Key, step))));
     }
     lines.extend([
         Line::from(format!("terminal {}x{}", area.width, area.height)),
         Line::from(format!("needed {COMPACT_COLUMNS}x{COMPACT_ROWS}")),
-        Line::from(span(
-            theme,
-            Role::Quiet,
-            if model.can_stop() { "STOP works, no key arms or jumps" } else { "enlarge the terminal" },
-        )),
     ]);
+    let keys = if model.can_stop() { "STOP works, no key arms or jumps" } else { "enlarge the terminal" };
+    lines.extend(wrapped(Line::from(span(theme, Role::Quiet, keys))));
     // What a key was answered, or refused for.
     lines.extend(message_rows(model, area.width).into_iter().map(|row| row.style(theme.style(Role::Warning))));
     frame.render_widget(Paragraph::new(lines), area);

@@ -52,13 +52,27 @@ fn mark(model: &Model, trial: u32) -> &'static str {
     }
 }
 
+/// Most columns of the path of a configuration.
+const CONFIGURATION_WIDTH: usize = 24;
+
+/// The path, or its end from a `/` on with `..` before it: that names the folder. A name that is longer than `width` is cut itself.
+fn end_of_path(path: &str, width: usize) -> String {
+    if columns(path) <= width {
+        return path.to_owned();
+    }
+    let path = path.trim_end_matches('/');
+    let mut ends = path.match_indices('/').map(|(at, _)| &path[at..]);
+    match ends.find(|end| columns(end) + 2 <= width) {
+        Some(end) => format!("..{end}"),
+        None => truncate(path.rsplit('/').next().unwrap_or(path), width),
+    }
+}
+
 /// The number of each verdict with the order, filter and columns of the table, from the longest to the shortest: shorter keys before
 /// fewer counts. Where the trials are judged again, the result of that.
 fn summaries(model: &Model) -> Vec<String> {
     if let Some(table) = &model.rejudged {
-        // The end of a path names the folder.
-        let skipped = table.configuration.chars().count().saturating_sub(24);
-        let name: String = table.configuration.chars().skip(skipped).collect();
+        let name = end_of_path(&table.configuration, CONFIGURATION_WIDTH);
         return vec![format!("new by {name}: {}", table.summary())];
     }
     let trials = &model.session.trials;
