@@ -165,7 +165,8 @@ fn no_energy_is_gained_in_a_thousand_drops() {
 fn no_energy_is_gained_in_tumbles_among_blocks() {
     let mut config = SimConfig::default();
     config.terrain.kind = TerrainKind::Blocks;
-    let tumbles = Drops { count: 200, ticks: 800, velocity_m_s: 3.0, rate_rad_s: 6.0, joint_rad_s: 15.0, height_m: 0.3 };
+    let tumbles =
+        Drops { count: 200, ticks: 800, velocity_m_s: 3.0, rate_rad_s: 6.0, joint_rad_s: 15.0, height_m: 0.3 };
     let (over, _) = tumbles.gains(&config, 12);
     assert!(over.value < 1e-9);
 }
