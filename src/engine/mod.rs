@@ -32,7 +32,7 @@ pub use rejudging::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, chan
 pub use stored::{Opened, StoredStudy, has_journal, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, check_budget, open_experiment, open_study, session_info, study_name};
 pub use threads::{EngineThreads, ScheduledSettings};
-pub use verify::{TickDifference, Verification, VerifyError, attached_config, attached_robot, verify};
+pub use verify::{RecordedRun, TickDifference, Verification, VerifyError, attached_config, attached_robot, verify};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 //! A simulated session run again from its recording alone, and compared tick by tick.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -9,13 +10,13 @@ use crate::config::{Config, ConfigLayer};
 use crate::recording::RecordingError;
 use crate::recording::difference::difference;
 use crate::recording::player::{Damage, Played, Player};
-use crate::recording::record::Record;
+use crate::recording::record::{Record, StageRecord};
 use crate::robot::description::{RobotDescription, RobotFiles};
 use crate::session::experiment::next_seed;
 use crate::session::rollout::Rollout;
 use crate::sim::Simulator;
 use crate::telemetry::{Tick, TrialSpec};
-use crate::trial::{Backend, JumpParameters, Task, TrialRecord, Verdict};
+use crate::trial::{Backend, ExperimentStage, JumpParameters, Task, TrialRecord, Verdict};
 
 /// Result of a verification.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +27,8 @@ pub enum Verification {
         trials: usize,
         /// Compared ticks.
         ticks: u64,
-        /// Trials that a person, a fault or a crash ended: nothing in the file repeats that.
-        left_out: Vec<u32>,
+        /// Rollouts that a person, a fault or a crash ended: nothing in the file repeats that.
+        left_out: Vec<RecordedRun>,
         /// Parts that were lost already when the file was recovered from a damaged one.
         lost_before: Vec<String>,
     },
@@ -35,12 +36,30 @@ pub enum Verification {
     Different(TickDifference),
 }
 
+/// A rollout in a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordedRun {
+    /// Number of the trial.
+    pub trial: u32,
+    /// Number of the rollout within the trial, from 1, void ones included; none for a trial that is one rollout.
+    pub rollout: Option<usize>,
+}
+
+impl fmt::Display for RecordedRun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.rollout {
+            None => write!(f, "trial {}", self.trial),
+            Some(rollout) => write!(f, "rollout {rollout} of trial {}", self.trial),
+        }
+    }
+}
+
 /// The first tick that differs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TickDifference {
-    /// Number of the trial.
-    pub trial: u32,
-    /// Place of the tick among those of the trial, from 0.
+    /// The rollout.
+    pub run: RecordedRun,
+    /// Place of the tick among those of the rollout, from 0.
     pub tick: u64,
     /// Number of the tick in the file; none if the file has too few.
     pub number: Option<u64>,
@@ -71,26 +90,17 @@ pub enum VerifyError {
     NotVerifiable { path: PathBuf, reason: String },
 }
 
-/// The ticks of one trial as the simulation gives them, one rollout at a time.
+/// The ticks of one rollout as the simulation gives them.
 struct ExpectedTicks {
-    trial: u32,
-    specs: VecDeque<TrialSpec>,
+    run: RecordedRun,
     ticks: VecDeque<Tick>,
     compared: u64,
 }
 
 impl ExpectedTicks {
-    fn next(&mut self, rollout: &mut Rollout<Simulator>) -> Option<Tick> {
-        while self.ticks.is_empty() {
-            let (_, ticks) = rollout.run(&self.specs.pop_front()?);
-            self.ticks.extend(ticks.iter().filter(|tick| tick.trial == Some(self.trial)));
-        }
-        self.ticks.pop_front()
-    }
-
-    /// Compares the next tick of the file; none for a file that has no more ticks of the trial.
-    fn compare(&mut self, rollout: &mut Rollout<Simulator>, recorded: Option<&Tick>) -> Option<TickDifference> {
-        let simulated = self.next(rollout);
+    /// Compares the next tick of the file; none for a file that has no more ticks of the rollout.
+    fn compare(&mut self, recorded: Option<&Tick>) -> Option<TickDifference> {
+        let simulated = self.ticks.pop_front();
         let (field, recorded_value, simulated_value) = match (recorded, &simulated) {
             (None, None) => return None,
             (Some(recorded), Some(simulated)) => match difference(recorded, simulated) {
@@ -105,17 +115,61 @@ impl ExpectedTicks {
             },
             (recorded, simulated) => {
                 let word = |tick: Option<&Tick>| if tick.is_some() { "a tick" } else { "no tick" }.to_owned();
-                ("number of ticks".to_owned(), word(recorded.copied().as_ref()), word(simulated.as_ref()))
+                ("number of ticks".to_owned(), word(recorded), word(simulated.as_ref()))
             }
         };
         Some(TickDifference {
-            trial: self.trial,
+            run: self.run,
             tick: self.compared,
             number: recorded.map(|tick| tick.number),
             field,
             recorded: recorded_value,
             simulated: simulated_value,
         })
+    }
+}
+
+/// The rollouts of a recording by the records of their begin and their end.
+#[derive(Default)]
+struct RecordedRollouts {
+    /// Time of each rollout that began in the file, and the number of judged ones before it, by trial and in the order of time. Those
+    /// of an interrupted trial that this one continues are in another file.
+    begun: BTreeMap<u32, VecDeque<(u64, usize)>>,
+    /// The row with the suggested verdict of each rollout that ended, by trial and judged rollouts before it.
+    ended: BTreeMap<(u32, usize), TrialRecord>,
+}
+
+impl RecordedRollouts {
+    fn of(player: &Player) -> RecordedRollouts {
+        let mut rollouts = RecordedRollouts::default();
+        let mut judged = BTreeMap::new();
+        for event in player.events() {
+            match &event.record {
+                Record::Trial(row) => {
+                    judged.insert(row.trial, row.repeats.len());
+                    if row.suggested.is_some() {
+                        rollouts.ended.insert((row.trial, row.repeats.len()), row.clone());
+                    }
+                }
+                Record::Stage(StageRecord { stage: ExperimentStage::Running, trial, .. }) => {
+                    if let Some(before) = judged.get(trial) {
+                        rollouts.begun.entry(*trial).or_default().push_back((event.time_ns, *before));
+                    }
+                }
+                _ => {}
+            }
+        }
+        rollouts
+    }
+
+    /// Takes the rollout with the first tick at `time_ns`: returns the number of judged ones before it.
+    fn begin(&mut self, trial: u32, time_ns: u64) -> Option<usize> {
+        let begun = self.begun.get_mut(&trial)?;
+        // One that was refused has no ticks.
+        while begun.get(1).is_some_and(|(next_ns, _)| *next_ns <= time_ns) {
+            begun.pop_front();
+        }
+        begun.pop_front().map(|(_, before)| before)
     }
 }
 
@@ -143,7 +197,7 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     let settings = config.settings(&robot, task, Backend::Simulator).map_err(|error| refuse(error.to_string()))?;
     let simulator = Simulator::new(&robot, &config.simulator).map_err(|error| refuse(error.to_string()))?;
     let mut rollout = Rollout::new(simulator, &settings);
-    let compared = compare_trials(&mut player, &mut rollout, &config, task);
+    let compared = compare_rollouts(&mut player, &mut rollout, &config, task);
     // A damaged chunk is found while it is played; its missing ticks are no difference of the simulation.
     damaged(&player)?;
     let lost_before = player.lost_before_recovery();
@@ -156,8 +210,8 @@ pub fn verify(path: &Path) -> Result<Verification, VerifyError> {
     }
 }
 
-/// Compares the ticks of every trial with those of the simulation up to the first difference.
-fn compare_trials(
+/// Compares the ticks of every rollout with those of the simulation up to the first difference.
+fn compare_rollouts(
     player: &mut Player,
     rollout: &mut Rollout<Simulator>,
     config: &Config,
@@ -165,51 +219,61 @@ fn compare_trials(
 ) -> Result<Verification, VerifyError> {
     let path = player.path().to_owned();
     let refuse = |reason: String| VerifyError::NotVerifiable { path: path.clone(), reason };
-    let rows = rows(player);
-    let (mut trials, mut ticks, mut left_out) = (0, 0, Vec::new());
+    let mut rollouts = RecordedRollouts::of(player);
+    let (mut trials, mut ticks, mut left_out) = (BTreeSet::new(), 0, Vec::new());
     let mut present: Option<ExpectedTicks> = None;
-    // The trial of the last tick that had one, compared or left out.
-    let mut last = None;
+    // Trial and time of the last tick, if it had a trial.
+    let mut last: Option<(u32, f64)> = None;
     for played in player.by_ref() {
         let Played::Tick(tick) = played else { continue };
-        let Some(trial) = tick.trial else { continue };
-        if last != Some(trial) {
-            last = Some(trial);
-            if let Some(mut ended) = present.take() {
-                if let Some(found) = ended.compare(rollout, None) {
-                    return Ok(Verification::Different(found));
-                }
-                ticks += ended.compared;
+        let begins = tick
+            .trial
+            .filter(|trial| last.is_none_or(|(of_last, last_s)| of_last != *trial || tick.trial_time_s < last_s));
+        last = tick.trial.map(|trial| (trial, tick.trial_time_s));
+        if (begins.is_some() || last.is_none())
+            && let Some(mut ended) = present.take()
+        {
+            if let Some(found) = ended.compare(None) {
+                return Ok(Verification::Different(found));
             }
-            let Some(row) = rows.get(&trial) else {
-                return Err(refuse(format!("trial {trial} has ticks but no row in the trial table")));
+            ticks += ended.compared;
+        }
+        if let Some(trial) = begins {
+            let Some(before) = rollouts.begin(trial, tick.time_ns) else {
+                return Err(refuse(format!("trial {trial} has ticks but no record of their begin")));
             };
-            if matches!(row.suggested, Some(Verdict::Accept | Verdict::Fall)) {
-                let specs = specs(config, task, row).ok_or_else(|| {
-                    refuse(format!("trial {trial} has no seed: it was recorded by an older version, or the study was begun by another program"))
-                })?;
-                trials += 1;
-                present = Some(ExpectedTicks { trial, specs, ticks: VecDeque::new(), compared: 0 });
-            } else {
-                left_out.push(trial);
+            let row = rollouts.ended.get(&(trial, before));
+            let run = RecordedRun { trial, rollout: (config.task(task).repeats > 1).then_some(before + 1) };
+            match row.filter(|row| matches!(row.suggested, Some(Verdict::Accept | Verdict::Fall))) {
+                Some(row) => {
+                    let spec = spec(config, task, row).ok_or_else(|| {
+                        refuse(format!("trial {trial} has no seed: it was recorded by an older version, or the study was begun by another program"))
+                    })?;
+                    let (_, simulated) = rollout.run(&spec);
+                    let of_trial = simulated.iter().filter(|tick| tick.trial == Some(trial)).copied();
+                    present = Some(ExpectedTicks { run, ticks: of_trial.collect(), compared: 0 });
+                    trials.insert(trial);
+                }
+                None => left_out.push(run),
             }
         }
         if let Some(expected) = &mut present
-            && let Some(found) = expected.compare(rollout, Some(&tick))
+            && let Some(found) = expected.compare(Some(&tick))
         {
             return Ok(Verification::Different(found));
         }
     }
     if let Some(mut ended) = present {
-        if let Some(found) = ended.compare(rollout, None) {
+        if let Some(found) = ended.compare(None) {
             return Ok(Verification::Different(found));
         }
         ticks += ended.compared;
     }
-    if trials == 0 {
+    if trials.is_empty() {
         return Err(VerifyError::NoTrial { path });
     }
-    Ok(Verification::Equal { trials, ticks, left_out, lost_before: player.lost_before_recovery() })
+    let lost_before = player.lost_before_recovery();
+    Ok(Verification::Equal { trials: trials.len(), ticks, left_out, lost_before })
 }
 
 /// Returns the text of an attached file.
@@ -254,26 +318,13 @@ pub fn attached_robot(player: &mut Player) -> Result<RobotDescription, VerifyErr
     RobotFiles::from_texts(path, toml, urdf).description().map_err(|error| refuse(error.to_string()))
 }
 
-/// Returns the newest row of each trial.
-fn rows(player: &Player) -> BTreeMap<u32, TrialRecord> {
-    let row = |record: &Record| match record {
-        Record::Trial(row) => Some((row.trial, row.clone())),
-        _ => None,
-    };
-    player.events().iter().filter_map(|event| row(&event.record)).collect()
-}
-
-/// Returns the settings of each rollout of a trial; none without its seed.
-fn specs(config: &Config, task: Task, row: &TrialRecord) -> Option<VecDeque<TrialSpec>> {
+/// Returns the settings of a rollout from the row at its end; none without its seed.
+fn spec(config: &Config, task: Task, row: &TrialRecord) -> Option<TrialSpec> {
     let control = config.task(task);
-    let spec = |seed| TrialSpec {
+    Some(TrialSpec {
         trial: row.trial,
         gains: control.gains().with(&row.gains).with(&row.parameters),
-        seed,
+        seed: next_seed(row)?,
         ..control.trial(task, JumpParameters::from_values(&row.parameters, control.f1_hz))
-    };
-    if row.repeats.is_empty() {
-        return Some(VecDeque::from([spec(next_seed(row)?)]));
-    }
-    Some(row.repeats.iter().map(|repeat| spec(repeat.seed)).collect())
+    })
 }

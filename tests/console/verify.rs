@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::program::{Program, assert_shows};
+use crate::pty::Session;
 use quadfrog::recording::player::{Played, Player};
 use quadfrog::recording::record::SessionInfo;
 use quadfrog::recording::writer::Writer;
@@ -193,4 +194,50 @@ fn a_loss_before_a_recovery_is_reported_beside_equal_ticks() {
     assert_eq!(status, Some(0), "{error}");
     assert_shows(&out, &["bit for bit"]);
     assert_shows(&error, &["cut.mcap: recovered from a file that was not whole: it was cut off"]);
+}
+
+/// Regression: of a trial with repeats that was continued, the rollouts of the session before were expected in the next file, too;
+/// one that a person had stopped was expected to go on to its end.
+#[test]
+fn stopped_and_continued_rollouts_of_a_trial_are_no_difference() {
+    let program = Program::new();
+    program.write("config/control.toml", "[tasks.forward]\nrepeats = 2\n");
+    let start =
+        |more: &[&str]| Session::start(&program.path("."), (100, 30), &[&["--config", "config"], more].concat());
+    let jump = |session: &mut Session| {
+        session.send("A");
+        session.wait_for(&["Press g twice"]);
+        session.approve();
+    };
+    let mut session = start(&[]);
+    session.wait_for(&["Press A to arm"]);
+    jump(&mut session);
+    session.wait_for(&["JUMP"]);
+    session.send("\x1b[24~");
+    session.wait_for(&["judge it"]);
+    session.send("v");
+    session.wait_for(&["u undo #0"]);
+    session.send("k");
+    session.wait_for(&["repeat 1 of 2", "Press A to arm"]);
+    jump(&mut session);
+    session.wait_for(&["judge it"]);
+    session.send("a");
+    session.wait_for(&["repeat 2 of 2"]);
+    assert!(session.quit().success(), "{}", session.screen());
+
+    let study = program.study("recordings");
+    let mut session = start(&["--resume", study.to_str().unwrap()]);
+    session.wait_for(&["repeat 2 of 2", "Press A to arm"]);
+    jump(&mut session);
+    session.wait_for(&["judge it"]);
+    session.send("a");
+    session.wait_for(&["Trial #2"]);
+    assert!(session.quit().success(), "{}", session.screen());
+
+    let (status, out, error) = verified(&program, &study);
+    assert_eq!(status, Some(0), "{error}");
+    let ended = "not compared, because a person, a fault or a crash ended it: rollout 1 of trial 0\n";
+    assert_shows(&out, &["ticks of 1 trial are simulated again", ended]);
+    assert_eq!(out.matches("bit for bit").count(), 2, "{out}");
+    assert_eq!(out.matches("not compared").count(), 1, "{out}");
 }

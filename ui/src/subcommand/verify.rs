@@ -70,9 +70,9 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
                 counted(trials, "trial")
             );
             if !left_out.is_empty() {
-                let numbers = left_out.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-                let (them, trials) = if left_out.len() == 1 { ("it", "trial") } else { ("them", "trials") };
-                put_line!("not compared, because a person, a fault or a crash ended {them}: {trials} {numbers}");
+                let runs = left_out.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+                let them = if left_out.len() == 1 { "it" } else { "them" };
+                put_line!("not compared, because a person, a fault or a crash ended {them}: {runs}");
             }
             for lost in lost_before {
                 notice!("{file}: {lost}");
@@ -80,10 +80,10 @@ fn verify(path: &Path) -> Result<(), VerifyFailure> {
             Ok(())
         }
         Verification::Different(found) => {
-            let TickDifference { trial, tick, number, field, recorded, simulated } = found;
+            let TickDifference { run, tick, number, field, recorded, simulated } = found;
             let number = number.map_or_else(String::new, |number| format!(" (number {number})"));
             Err(VerifyFailure::Other(Failure::Other(anyhow!(
-                "{file}: trial {trial}, tick {tick}{number}: {field} is {recorded} in the file, {simulated} in the simulation"
+                "{file}: {run}, tick {tick}{number}: {field} is {recorded} in the file, {simulated} in the simulation"
             ))))
         }
     }
