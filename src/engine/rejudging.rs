@@ -161,6 +161,11 @@ impl Rejudging {
         self.recording.damage()
     }
 
+    /// Returns the reasons for which ends of files are missing, with their names.
+    pub fn cuts(&self) -> Vec<String> {
+        self.recording.cuts()
+    }
+
     /// Returns what was lost already when the files were recovered from damaged ones, with their names.
     pub fn lost_before_recovery(&mut self) -> Vec<String> {
         self.recording.lost_before_recovery()

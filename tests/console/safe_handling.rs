@@ -68,6 +68,12 @@ fn a_recording_of_a_running_session_is_not_called_damaged() {
     assert_eq!(export.status.code(), Some(0), "{message}");
     assert_shows(&message, &["session.mcap.part: a session still writes it; it is exported up to"]);
     assert!(!message.contains("recover"), "{message}");
+    // Regression: `rejudge` failed, with the advice to recover the file.
+    let rejudge = program.run(&["rejudge", study.to_str().unwrap()]);
+    let message = String::from_utf8_lossy(&rejudge.stderr);
+    assert_eq!(rejudge.status.code(), Some(0), "{message}");
+    assert_shows(&message, &["session.mcap.part: a session still writes it; the trials that have ended are judged"]);
+    assert!(!message.contains("recover"), "{message}");
     // Regression: `verify` called it damaged and named the file twice.
     let refused = program.refused(&["verify", study.to_str().unwrap()]);
     assert_shows(&refused, &["session.mcap.part: not verifiable: a session still writes it"]);

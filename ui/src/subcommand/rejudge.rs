@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::put_line;
+use crate::{notice, put_line};
 use clap::Args;
 use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words};
 use quadfrog::recording::session_files::recordings_of;
@@ -12,8 +12,9 @@ use quadfrog::trial::Verdict;
 use serde_json::{Value, json};
 
 use super::arguments;
-use super::damage::require_whole;
+use super::damage::{require_whole, without_present_ends};
 use super::failure::Failure;
+use super::replay::is_written;
 
 #[derive(Debug, Args)]
 pub struct RejudgeArguments {
@@ -34,6 +35,7 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
     for path in &arguments.files {
         files.extend(recordings_of(path)?);
     }
+    let written: Vec<PathBuf> = files.iter().filter(|file| is_written(file)).cloned().collect();
     let mut rejudging = Rejudging::open(&files, &config).map_err(|error| match error {
         RejudgeError::Recording(error) => error.into(),
         error => Failure::input(error),
@@ -50,7 +52,12 @@ pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
         print(&results, rejudging.unit());
     }
     let lost_before = rejudging.lost_before_recovery();
-    require_whole(&rejudging.damage(), lost_before, "a trial of which ticks are missing there has no new judgement")
+    for file in &written {
+        notice!("{}: a session still writes it; the trials that have ended are judged", file.display());
+    }
+    let mut damage = rejudging.damage();
+    without_present_ends(&mut damage, &written, &rejudging.cuts());
+    require_whole(&damage, lost_before, "a trial of which ticks are missing there has no new judgement")
 }
 
 fn name(verdict: Option<Verdict>) -> &'static str {
