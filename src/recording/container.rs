@@ -205,11 +205,19 @@ impl Container {
                 op::ATTACHMENT => self.attachments.push(span),
                 op::METADATA => self.metadata.push(span),
                 op::DATA_END => {
-                    let left = bytes - at - RECORD_HEAD - length;
-                    if self.read_at(bytes - 8, 8)? != mcap::MAGIC || left < FOOTER_BYTES {
-                        self.cut = Some("its index at the end is missing; all of its data is there".into());
+                    self.unscanned = at;
+                    match self.end_of_file(at, bytes)? {
+                        Some(end) if end < bytes => {
+                            let rest = bytes - end;
+                            self.cut = Some(format!(
+                                "its last {rest} of {bytes} bytes follow its end, as those of another file, and are left out"
+                            ));
+                            return Ok(());
+                        }
+                        Some(_) => {}
+                        None => self.cut = Some("its index at the end is missing; all of its data is there".into()),
                     }
-                    (self.unscanned, self.data_end) = (at, Some(at));
+                    self.data_end = Some(at);
                     return Ok(());
                 }
                 0 => break, // no record: zeros left by a crashed file system
@@ -226,6 +234,26 @@ impl Container {
             rest => format!("it was cut off: its last {rest} of {bytes} bytes are an incomplete record"),
         });
         Ok(())
+    }
+
+    /// Returns the offset behind the end of the file that begins before `data_end`; none if its footer is missing. The index between
+    /// them may be damaged if the file ends as it should.
+    fn end_of_file(&mut self, data_end: u64, bytes: u64) -> Result<Option<u64>, McapError> {
+        let magic = mcap::MAGIC.len() as u64;
+        let mut at = data_end;
+        while bytes - at >= FOOTER_BYTES + magic {
+            let head = self.read_at(at, RECORD_HEAD)?;
+            let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
+            if head[0] == op::FOOTER && self.read_at(at + FOOTER_BYTES, magic)? == mcap::MAGIC {
+                return Ok(Some(at + FOOTER_BYTES + magic));
+            }
+            if length > bytes - at - RECORD_HEAD {
+                break;
+            }
+            at += RECORD_HEAD + length;
+        }
+        let is_ended = bytes - data_end >= DATA_END_BYTES + FOOTER_BYTES + magic;
+        Ok((is_ended && self.read_at(bytes - magic, magic)? == mcap::MAGIC).then_some(bytes))
     }
 
     /// Returns the records of a chunk after verifying its checksum, and knows its channels from then on.

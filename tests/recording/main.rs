@@ -12,6 +12,7 @@ mod skip;
 mod damage;
 mod difference;
 mod messages;
+mod other_writers;
 mod python;
 mod recorder;
 mod roundtrip;
