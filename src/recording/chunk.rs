@@ -43,33 +43,33 @@ impl ChunkRecords {
         if messages > MOST_MESSAGES { Err(ChunkError::TooManyMessages { most: MOST_MESSAGES }) } else { Ok(records) }
     }
 
-    fn unpacked(body: &[u8], largest: usize) -> Result<ChunkRecords, McapError> {
+    fn unpacked(body: &[u8], largest: usize) -> Result<ChunkRecords, ChunkError> {
         if !texts_fit(op::CHUNK, body) {
-            return Err(McapError::UnexpectedEoc);
+            return Err(McapError::UnexpectedEoc.into());
         }
         let Record::Chunk { header, data } = mcap::parse_record(op::CHUNK, body)? else {
             unreachable!("parsed by its opcode");
         };
         let bytes = match header.compression.as_str() {
             _ if header.uncompressed_size > largest as u64 => {
-                return Err(McapError::ChunkTooLarge(header.uncompressed_size));
+                return Err(McapError::ChunkTooLarge(header.uncompressed_size).into());
             }
             "" => data.into_owned(),
             "zstd" => zstd::bulk::decompress(&data, header.uncompressed_size as usize)
                 .map_err(|error| McapError::DecompressionError(error.to_string()))?,
-            other => return Err(McapError::UnsupportedCompression(other.into())),
+            other => return Err(ChunkError::Compression { name: other.escape_default().to_string() }),
         };
         if bytes.len() as u64 != header.uncompressed_size {
-            return Err(McapError::UnexpectedEoc);
+            return Err(McapError::UnexpectedEoc.into());
         }
         let (saved, calculated) = (header.uncompressed_crc, crc32fast::hash(&bytes));
         if saved != 0 && saved != calculated {
-            return Err(McapError::BadChunkCrc { saved, calculated });
+            return Err(McapError::BadChunkCrc { saved, calculated }.into());
         }
         let records = ChunkRecords { bytes, checked: saved != 0 };
         let read: usize = records.records().map(|(_, body)| RECORD_HEAD + body.len()).sum();
         let fit = records.records().all(|(opcode, body)| texts_fit(opcode, body));
-        if fit && read == records.bytes.len() { Ok(records) } else { Err(McapError::UnexpectedEoc) }
+        if fit && read == records.bytes.len() { Ok(records) } else { Err(McapError::UnexpectedEoc.into()) }
     }
 
     /// Returns opcode and body of each record.

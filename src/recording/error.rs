@@ -13,6 +13,8 @@ pub enum ChunkError {
     Mcap(#[from] McapError),
     #[error("it holds more than {most} messages: damaged, or not written by quadfrog")]
     TooManyMessages { most: usize },
+    #[error("compression {name} cannot be read, zstd and none can: `mcap compress` writes a copy with zstd")]
+    Compression { name: String },
 }
 
 /// A recording could not be written, read or recovered.
@@ -48,6 +50,8 @@ pub enum RecordingError {
         path.display()
     )]
     NoSession { path: PathBuf },
+    #[error("{}: no /session message of it can be read: {reason}", path.display())]
+    UnreadableSession { path: PathBuf, reason: String },
     #[error("{}: damaged at its beginning ({source}); the rest cannot be decoded without its schemas and channels", path.display())]
     Head { path: PathBuf, source: ChunkError },
     #[error("{}: cut off after {bytes} bytes, before the session's first message; nothing in it can be played", path.display())]

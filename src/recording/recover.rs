@@ -1,6 +1,7 @@
 //! Recovery of a recording that was not finished or is damaged.
 
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Display;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,7 @@ pub struct Recovered {
 /// an index: `x.mcap` for `x.mcap.part`, `x.recovered.mcap` for `x.mcap`. Nothing is overwritten and nothing deleted.
 ///
 /// # Errors
-/// When there is nothing to recover, when the new file exists already, or when the disk fails.
+/// When there is nothing to recover or no session in it, when the new file exists already, or when the disk fails.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovered, RecordingError> {
     let path = path.as_ref();
     let target = match path.extension() {
@@ -91,6 +92,13 @@ pub fn recover_to(path: &Path, target: &Path) -> Result<Recovered, RecordingErro
     let result = Output::new(Box::new(file)).and_then(|out| RecordCopier::new(out).all(&mut container));
     let result = result.map_err(|error| RecordingError::of_writing(&unfinished, error));
     let named = result.and_then(|copied| {
+        if copied.sessions == 0 {
+            let path = path.into();
+            return Err(match copied.first_damage {
+                Some(reason) => RecordingError::UnreadableSession { path, reason },
+                None => RecordingError::NoSession { path },
+            });
+        }
         if target.exists() {
             return Err(exists());
         }
@@ -113,7 +121,11 @@ struct RecordCopier {
 struct CopyCounts {
     ticks: u64,
     messages: u64,
+    /// Messages on `/session`.
+    sessions: u64,
     damaged_chunks: usize,
+    /// Reason of the first damaged chunk.
+    first_damage: Option<String>,
     /// Messages of channels that the file does not describe.
     unknown_messages: usize,
     /// Attachments and metadata.
@@ -161,7 +173,8 @@ impl RecordCopier {
                     // The new file has the chunks of the old one: each holds whole ticks.
                     self.out.mcap.flush()?;
                 }
-                Ok(Err(_)) | Err(_) => self.done.damaged_chunks += 1,
+                Ok(Err(error)) => self.damaged(&error),
+                Err(error) => self.damaged(error),
             }
         }
         if self.done.damaged_chunks > 0 {
@@ -174,6 +187,11 @@ impl RecordCopier {
         }
         self.out.finish()?;
         Ok(self.done)
+    }
+
+    fn damaged(&mut self, reason: &dyn Display) {
+        self.done.damaged_chunks += 1;
+        self.done.first_damage.get_or_insert_with(|| reason.to_string());
     }
 
     /// Writes the events that only the copies at the end of the old file still have, the session's own among them.
@@ -231,6 +249,7 @@ impl RecordCopier {
                 if let Some(&(id, topic)) = self.channels.get(&header.channel_id) {
                     self.done.messages += 1;
                     self.done.ticks += u64::from(topic == Some(Topic::Tick));
+                    self.done.sessions += u64::from(topic == Some(Topic::Session));
                     header.channel_id = id;
                     if let Some(topic) = topic {
                         self.out.events.add(topic, id, header.log_time, &data);

@@ -108,12 +108,14 @@ impl Player {
         self.markers.sort_by_key(|marker| marker.time_ns);
     }
 
-    /// Returns the error of a file without session: truncated before it, or of another program.
+    /// Returns the error of a file without session: truncated before it, unreadable, or of another program.
     pub(super) fn no_session(&self) -> RecordingError {
         let path = self.path.clone();
         let bytes = std::fs::metadata(&path).map(|metadata| metadata.len()).unwrap_or_default();
         if self.chunks.is_empty() && self.container.cut.is_some() {
             RecordingError::TooShort { path, bytes }
+        } else if let Some(first) = self.damaged.first() {
+            RecordingError::UnreadableSession { path, reason: first.reason.clone() }
         } else {
             RecordingError::NoSession { path }
         }
