@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use experiment::{plan, skip, study, study_in, ticks, without_journal};
 use quadfrog::optimize::study::Storage;
+use quadfrog::recording::record::Record;
 use quadfrog::session::experiment::{Experiment, ExperimentPlan};
 use quadfrog::telemetry::{FallCause, TrialEnd, TrialSpec};
 use quadfrog::trial::{ExperimentStage, JudgedBy, TrialRecord, Verdict};
@@ -73,6 +74,27 @@ fn the_value_is_the_mean_of_the_rollouts_and_a_fall_counts_zero() {
     ];
     assert_eq!(recorded, expected);
     assert_eq!((repeat(&experiment), experiment.counted()), ((1, 1, 3), 1));
+}
+
+/// Regression: in recordings the first proposal of such a trial was repeat 0 of 0.
+#[test]
+fn the_first_proposal_of_a_trial_is_published_with_the_number_of_its_rollout() {
+    let published = |experiment: &mut Experiment| {
+        let of_proposal = |record| match record {
+            Record::Proposal(proposal) => Some((proposal.trial, proposal.repeat, proposal.repeats)),
+            _ => None,
+        };
+        experiment.take_records().into_iter().filter_map(of_proposal).collect::<Vec<_>>()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut experiment = three_in(folder.path());
+    assert_eq!(published(&mut experiment), [(0, 1, 3)]);
+    judged(&mut experiment, TrialEnd::Settled, 0.6, Verdict::Accept);
+    assert_eq!(published(&mut experiment), [(0, 2, 3)]);
+    drop(experiment);
+    assert_eq!(published(&mut three_in(folder.path())), [(1, 2, 3)], "the interrupted trial is continued");
+    let mut single = Experiment::open(plan_of(1), study(Storage::Memory)).unwrap();
+    assert_eq!(published(&mut single), [(0, 0, 0)]);
 }
 
 #[test]

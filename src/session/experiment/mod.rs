@@ -209,11 +209,7 @@ impl Experiment {
     /// Returns the proposal that waits for approval.
     pub fn proposal(&self) -> Option<Proposal> {
         match &self.state {
-            ExperimentState::Proposed(open) => {
-                let repeats = if self.plan.control.repeats > 1 { self.plan.control.repeats } else { 0 };
-                let repeat = if repeats > 0 { open.continued_repeats() + 1 } else { 0 };
-                Some(Proposal { repeat, repeats, ..open.proposal() })
-            }
+            ExperimentState::Proposed(open) => Some(self.first_proposal(open)),
             ExperimentState::BetweenRepeats(between) => self.repeat_proposal(between),
             _ => None,
         }

@@ -77,7 +77,7 @@ impl Experiment {
             self.warn(message);
         }
         self.outbox.push(Record::Insight(open.insight(&model)));
-        self.outbox.push(Record::Proposal(open.proposal()));
+        self.outbox.push(Record::Proposal(self.first_proposal(&open)));
         let (returns, changed) = (!matches!(self.state, ExperimentState::Proposed(_)), open.is_changed());
         self.enter(ExperimentState::Proposed(Box::new(open)), number);
         if returns && changed {

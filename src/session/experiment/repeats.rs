@@ -4,6 +4,7 @@
 
 use super::attributes::{self, JudgedAttributes, RepeatsAttribute};
 use super::between_repeats::BetweenRepeats;
+use super::open_proposal::OpenProposal;
 use super::plan::{RequestRefusal, not_now};
 use super::{Experiment, ExperimentState};
 use crate::optimize::study::{Outcome, StudyError, TellOutcome};
@@ -12,6 +13,15 @@ use crate::telemetry::TrialSpec;
 use crate::trial::{JudgedBy, Proposal, ProposedParameter, RepeatRecord, TrialRecord, Verdict};
 
 impl Experiment {
+    /// Returns the proposal of the first rollout that a trial has in this session.
+    pub(super) fn first_proposal(&self, open: &OpenProposal) -> Proposal {
+        let proposal = open.proposal();
+        match self.plan.control.repeats {
+            0 | 1 => proposal,
+            repeats => Proposal { repeat: open.continued_repeats() + 1, repeats, ..proposal },
+        }
+    }
+
     /// Returns the proposal of the trial's next rollout.
     pub(super) fn repeat_proposal(&self, between: &BetweenRepeats) -> Option<Proposal> {
         let row = self.rows.get(&between.trial())?;
