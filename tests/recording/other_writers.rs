@@ -31,6 +31,23 @@ fn copied(bytes: &[u8], chunk_bytes: u64) -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
+/// Regression: of a copy in other chunks the ticks were lost whose command is in the chunk before, "perhaps of a newer version".
+#[test]
+fn a_copy_in_other_chunks_has_every_tick() {
+    let (folder, bytes, everything) = recorded();
+    let copy = folder.path().join("copy.mcap");
+    for chunk_bytes in [4_000, 300_000] {
+        fs::write(&copy, copied(&bytes, chunk_bytes)).unwrap();
+        assert_same(&play(&copy), &everything);
+        let mut player = Player::open(&copy).unwrap();
+        for from_ns in [2_345 * MS, 1_234 * MS] {
+            player.seek(from_ns);
+            let expected: Vec<_> = everything.iter().filter(|played| played.time_ns() >= from_ns).cloned().collect();
+            assert_same(&player.by_ref().collect::<Vec<_>>(), &expected);
+        }
+    }
+}
+
 /// Regression: a recording with an unknown compression was "not a recording of quadfrog", and its recovery an empty file.
 #[test]
 fn a_compression_that_cannot_be_read_is_named() {

@@ -49,10 +49,9 @@ impl Player {
             let count = self.unreadable.count();
             let first = if count > 1 { "the first " } else { "" };
             let messages = counted(count, "message");
-            format!(
-                "{messages} cannot be read, {first}at {:.3} s: {error}; perhaps of a newer version",
-                seconds(*log_time)
-            )
+            // A newer version writes every part of a tick.
+            let newer = if matches!(error, DecodeError::Missing(_)) { "" } else { "; perhaps of a newer version" };
+            format!("{messages} cannot be read, {first}at {:.3} s: {error}{newer}", seconds(*log_time))
         });
         let left_out = self.left_out_from.map(|log_time| {
             let from_s = seconds(log_time);

@@ -34,7 +34,7 @@ pub struct UnreadableMessages {
     /// Number of them in each chunk, by the chunk's offset; at offset 0 those among the copies of the events.
     counts: BTreeMap<u64, usize>,
     /// Log time and error of the earliest one.
-    pub first: Option<(u64, String)>,
+    pub first: Option<(u64, DecodeError)>,
 }
 
 impl UnreadableMessages {
@@ -44,7 +44,7 @@ impl UnreadableMessages {
         for (log_time, error) in errors {
             count += 1;
             if self.first.as_ref().is_none_or(|(earliest, _)| log_time < *earliest) {
-                self.first = Some((log_time, error.to_string()));
+                self.first = Some((log_time, error));
             }
         }
         if count > 0 {

@@ -11,6 +11,9 @@ mod tick_joiner;
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
+use mcap::records::MessageHeader;
+
+use super::chunk::ChunkRecords;
 use super::container::{Chunk, Container};
 use super::error::RecordingError;
 use super::event_index;
@@ -75,6 +78,9 @@ pub struct Marker {
     pub kind: MarkerKind,
 }
 
+/// A message on `/robot/joint_cmd`.
+type CommandMessage = (MessageHeader, Vec<u8>);
+
 /// Iterator over the ticks and records of a recording, in the order of time.
 pub struct Player {
     container: Container,
@@ -91,6 +97,8 @@ pub struct Player {
     /// The next chunk to read; all before it are played or in the queue.
     next_chunk: usize,
     from_ns: u64,
+    /// The last command before a chunk, and the chunk's place: the one after that which was read last.
+    carried: (usize, Option<CommandMessage>),
     /// Time before which only the ticks are played whose number the second value divides.
     sparse_until: Option<(u64, u32)>,
     damaged: Vec<DamagedChunk>,
@@ -127,6 +135,7 @@ impl Player {
             queue: VecDeque::new(),
             next_chunk: 0,
             from_ns: 0,
+            carried: (0, None),
             sparse_until: None,
             damaged: Vec::new(),
             unguarded: BTreeSet::new(),
@@ -282,12 +291,43 @@ impl Player {
         of_tick.any(|event| matches!(event.record, Record::Transition(_)))
     }
 
+    /// Returns the last command before chunk `place`, which its first tick needs where another program has divided the recording into
+    /// chunks of its own. None beyond a damaged chunk, which may have held another one.
+    fn command_before(&mut self, place: usize, carried: (usize, Option<CommandMessage>)) -> Option<CommandMessage> {
+        if carried.0 == place {
+            return carried.1;
+        }
+        for earlier in (0..place).rev() {
+            let records = self.records_of(&self.chunks[earlier].clone())?;
+            let topic = |header: &MessageHeader| self.container.topic(header.channel_id);
+            let commands =
+                records.messages().flatten().filter(|(header, _)| topic(header) == Some(Topic::JointCommand));
+            if let Some((header, data)) = commands.last() {
+                return Some((header, data.to_vec()));
+            }
+        }
+        None
+    }
+
+    /// Whether the first tick of a chunk comes before its first command.
+    fn lacks_command(&self, records: &ChunkRecords) -> bool {
+        let topics = records.messages().flatten().filter_map(|(header, _)| self.container.topic(header.channel_id));
+        let mut of_ticks = topics.filter(|topic| [Topic::Tick, Topic::JointCommand].contains(topic));
+        of_ticks.next() == Some(Topic::Tick)
+    }
+
     /// Reads the next chunk into the queue.
     fn read_chunk(&mut self) {
-        let chunk = self.chunks[self.next_chunk].clone();
+        let place = self.next_chunk;
+        let chunk = self.chunks[place].clone();
         self.next_chunk += 1;
+        let carried = std::mem::replace(&mut self.carried, (place + 1, None));
         let Some(records) = self.records_of(&chunk) else { return };
+        let before = if self.lacks_command(&records) { self.command_before(place, carried) } else { None };
         let mut joiner = TickJoiner::default();
+        if let Some((header, data)) = &before {
+            joiner.set_command(header.clone(), data);
+        }
         let mut errors = Vec::new();
         for (header, data) in records.messages().flatten() {
             let Some(topic) = self.container.topic(header.channel_id) else { continue };
@@ -324,6 +364,7 @@ impl Player {
                 Err(error) => errors.push((header.log_time, error)),
             }
         }
+        self.carried.1 = joiner.command.map(|(header, data)| (header, data.to_vec()));
         self.unreadable.add(chunk.span.offset, errors);
         // Ticks and records come from two producers: a record may be written a little after ticks that are newer.
         self.queue.make_contiguous().sort_by_key(Played::time_ns);

@@ -14,7 +14,7 @@ pub struct TickJoiner<'a> {
     /// The last message on `/robot/joint_states`; of older recordings it belongs to the tick after it.
     pub joints: Option<(MessageHeader, &'a [u8])>,
     /// The last message on `/robot/joint_cmd`.
-    command: Option<(MessageHeader, &'a [u8])>,
+    pub command: Option<(MessageHeader, &'a [u8])>,
     /// The same, decoded.
     decoded: Option<frog::JointCommand>,
     /// The message of the last tick, whose memory serves the next one.
