@@ -104,7 +104,7 @@ impl Timeline {
     /// Appends a file after all others: with the real pause before it, or with 1 s for a long one.
     fn append(&mut self, player: Player) -> Result<(), RecordingError> {
         let (Some(first), Some(last)) = (self.parts.first(), self.parts.last()) else { return Ok(()) };
-        self.check_same_study(&player)?;
+        check_same_study(&first.player, &self.rows(), &player)?;
         let end_ns = last.end_ns();
         if player.start_utc_ns() == last.player.start_utc_ns() {
             // The next file of the same session: on one clock, and no pause is shortened.
@@ -127,29 +127,6 @@ impl Timeline {
     /// The first file.
     pub fn first_player(&mut self) -> &mut Player {
         &mut self.parts[0].player
-    }
-
-    /// Files of two studies would mix their trials.
-    fn check_same_study(&self, player: &Player) -> Result<(), RecordingError> {
-        let (ours, theirs) = (self.session(), player.session());
-        let other = |reason: String| RecordingError::OtherStudy {
-            path: player.path().into(),
-            first: self.parts[0].player.path().into(),
-            reason,
-        };
-        for (what, ours, theirs) in
-            [("the task", ours.task_name(), theirs.task_name()), ("the robot", &ours.robot, &theirs.robot)]
-        {
-            if ours != theirs {
-                return Err(other(format!("{what} is {theirs}, not {ours}")));
-            }
-        }
-        let rows = self.rows();
-        let differs = |row: &&TrialRecord| rows.get(&row.trial).is_some_and(|known| known.parameters != row.parameters);
-        match rows_of(player.events().iter()).values().find(differs) {
-            Some(row) => Err(other(format!("trial {} has other parameters", row.trial))),
-            None => Ok(()),
-        }
     }
 
     /// Reads what was written since: what was appended to the last file, and the file that continues it. Returns whether there
@@ -380,6 +357,38 @@ impl Iterator for Timeline {
                 None => next.player.seek(0),
             }
         }
+    }
+}
+
+/// Refuses files of several studies: they would mix their trials.
+///
+/// # Errors
+/// Names the first file that is of another study than the first one.
+pub fn check_one_study(players: &[Player]) -> Result<(), RecordingError> {
+    let mut rows = BTreeMap::new();
+    for player in players {
+        check_same_study(&players[0], &rows, player)?;
+        rows.extend(rows_of(player.events().iter()));
+    }
+    Ok(())
+}
+
+/// Refuses a file of another study than `first`; `rows` are those of the files of its study.
+fn check_same_study(first: &Player, rows: &BTreeMap<u32, TrialRecord>, player: &Player) -> Result<(), RecordingError> {
+    let (ours, theirs) = (first.session(), player.session());
+    let other =
+        |reason: String| RecordingError::OtherStudy { path: player.path().into(), first: first.path().into(), reason };
+    for (what, ours, theirs) in
+        [("the task", ours.task_name(), theirs.task_name()), ("the robot", &ours.robot, &theirs.robot)]
+    {
+        if ours != theirs {
+            return Err(other(format!("{what} is {theirs}, not {ours}")));
+        }
+    }
+    let differs = |row: &&TrialRecord| rows.get(&row.trial).is_some_and(|known| known.parameters != row.parameters);
+    match rows_of(player.events().iter()).values().find(differs) {
+        Some(row) => Err(other(format!("trial {} has other parameters", row.trial))),
+        None => Ok(()),
     }
 }
 

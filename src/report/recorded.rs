@@ -53,15 +53,30 @@ pub struct Recordings {
 }
 
 impl Recordings {
-    /// Reads all recordings, finished or not. A file that cannot be read is noted in `damages`. Of a trial that is in
-    /// several recordings the last counts.
-    pub fn read(files: &[PathBuf], robot: &RobotDescription) -> Recordings {
-        let mut read = Recordings { files: files.to_vec(), ..Recordings::default() };
+    /// Reads the recordings in the folder of a study, finished or not; `study` has the parameters of its trials. A file that cannot
+    /// be read or is of another study is noted in `damages`. Of a trial that is in several recordings the last counts.
+    pub fn read(files: &[PathBuf], study: &BTreeMap<u32, ParameterValues>, robot: &RobotDescription) -> Recordings {
+        let mut read = Recordings::default();
         for file in files {
-            match Player::open(file) {
-                Ok(player) => read.play(player, robot, &|_| true),
-                Err(error) => read.damages.push(error.to_string()),
+            let player = match Player::open(file) {
+                Ok(player) => player,
+                Err(error) => {
+                    read.files.push(file.clone());
+                    read.damages.push(error.to_string());
+                    continue;
+                }
+            };
+            let rows = rows_of(player.events().iter());
+            let differs = |row: &&TrialRecord| study.get(&row.trial).is_some_and(|known| !has_parameters(row, known));
+            if let Some(row) = rows.values().find(differs) {
+                let (file, trial) = (file.display(), row.trial);
+                read.damages.push(format!(
+                    "{file}: left out, because it is of another study: trial {trial} has other parameters there"
+                ));
+                continue;
             }
+            read.files.push(file.clone());
+            read.play(player, robot, &|_| true);
         }
         read
     }
@@ -74,12 +89,9 @@ impl Recordings {
             Err(error) => return self.damages.push(error.to_string()),
         };
         let rows = rows_of(player.events().iter());
-        let is_same = |row: &TrialRecord, parameters: &ParameterValues| {
-            let equal = |(name, value): &(String, f64)| row.parameters.get(name) == Some(*value);
-            row.parameters.len() == parameters.len() && parameters.iter().all(equal)
+        let is_of_study = |trial| {
+            rows.get(&trial).zip(named.get(&trial)).is_some_and(|(row, parameters)| has_parameters(row, parameters))
         };
-        let is_of_study =
-            |trial| rows.get(&trial).zip(named.get(&trial)).is_some_and(|(row, parameters)| is_same(row, parameters));
         if named.keys().any(|trial| is_of_study(*trial)) {
             self.files.push(file.to_owned());
             self.play(player, robot, &is_of_study);
@@ -149,4 +161,10 @@ impl Recordings {
         }
         ticks.clear();
     }
+}
+
+/// Whether a recorded row has these parameters, in any order.
+fn has_parameters(row: &TrialRecord, parameters: &ParameterValues) -> bool {
+    let equal = |(name, value): &(String, f64)| row.parameters.get(name) == Some(*value);
+    row.parameters.len() == parameters.len() && parameters.iter().all(equal)
 }

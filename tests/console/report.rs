@@ -399,3 +399,21 @@ fn ticks_of_another_study_are_not_shown() {
     fs::copy(program.study("others").join("session.mcap"), program.study("workers").join("session.mcap")).unwrap();
     assert_shows(&program.text(&["report", "shared.log"]), &["No recording of this study exists"]);
 }
+
+/// Regression: ticks of a recording of another study, which lies in the folder, were taken for those of the study.
+#[test]
+fn a_recording_of_another_study_in_the_folder_is_left_out() {
+    let (program, study) = study(&[]);
+    program.text(&["optimize", "--trials", "1", "--record", "all", "--seed", "7", "--output", "others"]);
+    let other = program.study("others").join("session.mcap");
+    fs::copy(other, Path::new(&study).join("session-2.mcap")).unwrap();
+    let report = program.text(&["report", &study]);
+    let words = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    let reason = "session-2.mcap: left out, because it is of another study: trial 0 has other parameters there.";
+    assert_shows(&words, &[reason]);
+    assert!(!words.contains(", session-2.mcap"), "{words}");
+    // Regression: they were among the exported ones.
+    let refused = program.refused(&["export", &study, "-o", "ticks.csv"]);
+    assert_shows(&refused, &["session-2.mcap: not of the study of", "trial 0 has other parameters"]);
+    assert!(!program.path("ticks.csv").exists());
+}

@@ -1,5 +1,7 @@
 //! Derived quantities of a jump, measured from made-up ticks with known answers.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use quadfrog::optimize::ask::Direction;
 use quadfrog::recording::record::{Record, SessionInfo, Stamped};
@@ -311,7 +313,7 @@ fn a_report_names_the_operators_and_the_values_that_they_have_set() {
             path
         });
     let mut study = study(0, rows());
-    study.recordings = Recordings::read(&files, &robot);
+    study.recordings = Recordings::read(&files, &BTreeMap::new(), &robot);
     let page = study_page::page(std::slice::from_ref(&study), &[], "0.1.0 (test)");
     let shown = text::render(&page, 200);
     assert!(

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCandidates;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_of;
-use quadfrog::recording::timeline::in_order;
+use quadfrog::recording::timeline::{check_one_study, in_order};
 use quadfrog::report::columns::TableFormat;
 use quadfrog::report::signals::{SignalRange, SignalTopic, Signals};
 use quadfrog::trial::counted;
@@ -120,6 +120,7 @@ fn export_signals(file: &Path, arguments: &ExportArguments) -> Result<(), Failur
     let written: Vec<&PathBuf> = files.iter().filter(|file| is_written(file)).collect();
     let players = files.iter().map(Player::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     let mut players = in_order(players);
+    check_one_study(&players).map_err(Failure::input)?;
     let one_session = players.windows(2).all(|pair| pair[0].start_utc_ns() == pair[1].start_utc_ns());
     if arguments.time.is_some() && !one_session {
         let several = "--time: its files are of several sessions, each with its own begin; give one of the files";

@@ -81,7 +81,8 @@ fn reported(
         Some(robot) => {
             let own = folder.map_or_else(Vec::new, recordings_in);
             let elsewhere = elsewhere(opened, &rows, &own);
-            read(&own, &elsewhere, robot)
+            let parameters = rows.iter().map(|row| (row.trial, row.parameters.clone())).collect();
+            read(&own, &parameters, &elsewhere, robot)
         }
         None => Recordings::default(),
     };
@@ -116,10 +117,15 @@ fn reported(
 }
 
 /// Reads the recordings in a study's folder, in the order of their sessions, then those that its trials name elsewhere; what a session
-/// still writes is not damaged by having no end.
-fn read(own: &[PathBuf], elsewhere: &NamedRecordings, robot: &RobotDescription) -> Recordings {
+/// still writes is not damaged by having no end. `parameters` are those of the trials of the study.
+fn read(
+    own: &[PathBuf],
+    parameters: &BTreeMap<u32, ParameterValues>,
+    elsewhere: &NamedRecordings,
+    robot: &RobotDescription,
+) -> Recordings {
     let written: Vec<&PathBuf> = own.iter().chain(elsewhere.keys()).filter(|file| is_written(file)).collect();
-    let mut recordings = Recordings::read(own, robot);
+    let mut recordings = Recordings::read(own, parameters, robot);
     for (file, named) in elsewhere {
         recordings.add(file, named, robot);
     }
