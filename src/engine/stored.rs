@@ -42,11 +42,16 @@ pub fn has_journal(storage: &Storage) -> Result<bool, EngineError> {
     }
 }
 
-/// Returns the studies of this program in `storage`; none if the file does not exist.
-pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
+/// Returns the names of all studies in `storage`, each with its description if this program made it; none if the file does not exist.
+pub fn named_studies(storage: &Storage) -> Result<Vec<(String, Option<StoredStudy>)>, EngineError> {
     let journal = storage.journal(Durability::Synced).map_err(StudyError::from)?;
     let living = journal.state().studies().iter().filter(|study| !study.deleted);
-    Ok(living.filter_map(stored).collect())
+    Ok(living.map(|study| (study.name.clone(), stored(study))).collect())
+}
+
+/// Returns the studies of this program in `storage`; none if the file does not exist.
+pub fn stored_studies(storage: &Storage) -> Result<Vec<StoredStudy>, EngineError> {
+    Ok(named_studies(storage)?.into_iter().filter_map(|(_, ours)| ours).collect())
 }
 
 /// Returns the study in `file`.

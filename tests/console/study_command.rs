@@ -73,6 +73,18 @@ fn studies_are_listed_and_shown() {
     assert!(program.refused(&["study", "show", &study, "--name", "other"]).contains("forward-seed0"));
 }
 
+/// Regression: the list of a folder with studies of other programs alone was an empty table.
+#[test]
+fn a_study_of_another_program_is_listed() {
+    let program = Program::new();
+    program.write("recordings/optuna/study.log", include_str!("../golden/tpe/journal.log"));
+    let list = program.text(&["study", "list"]);
+    let rows: Vec<Vec<&str>> = list.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(rows[0], ["study", "task", "seed", "trials", "counted", "falls", "best"]);
+    assert_eq!(rows[1][..3], ["recordings/optuna", "-", "-"], "{list}");
+    assert_eq!(rows[1][5], "-", "{list}");
+}
+
 #[test]
 fn an_exported_study_is_imported_unchanged_in_both_formats() {
     let (program, first) = study("forward");

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::{notice, output};
 use clap::{Args, Subcommand};
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, running_session, stored_studies, study_files};
+use quadfrog::engine::{Opened, STUDY_FILE, StoredStudy, named_studies, running_session, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::optimize::trial::{CHANGED_VERDICT, Trial};
 use quadfrog::printable::shell_word;
@@ -131,10 +131,10 @@ fn list(folder: &Path) -> Result<(), Failure> {
     let mut unlisted = 0;
     for file in &files {
         // A study that cannot be read is reported, and the others are listed.
-        let studies = stored_studies(&Storage::File(file.clone()));
+        let studies = named_studies(&Storage::File(file.clone()));
         unlisted += usize::from(studies.is_err());
-        for stored in studies.inspect_err(|error| notice!("{error}")).unwrap_or_default() {
-            match list_row(file, &stored) {
+        for (name, ours) in studies.inspect_err(|error| notice!("{error}")).unwrap_or_default() {
+            match list_row(file, name, ours.as_ref()) {
                 Err(failure @ Failure::Input(_)) => {
                     failure.print();
                     unlisted += 1;
@@ -156,21 +156,28 @@ fn list(folder: &Path) -> Result<(), Failure> {
     }
 }
 
-fn list_row(file: &Path, stored: &StoredStudy) -> Result<Vec<String>, Failure> {
-    let opened = StudySelector { place: file.display().to_string(), name: stored.name.clone() }.open()?;
+/// Returns the row of a study; `ours` is the description of one of this program.
+fn list_row(file: &Path, name: String, ours: Option<&StoredStudy>) -> Result<Vec<String>, Failure> {
+    let none = || "-".to_owned();
+    let folder = file.parent().unwrap_or(file).display().to_string();
+    let opened = match (StudySelector { place: file.display().to_string(), name: Some(name) }.open(), ours) {
+        // With several objectives, or without a real number among its parameters.
+        (Err(Failure::Input(_)), None) => return Ok([vec![folder], vec![none(); 6]].concat()),
+        (opened, _) => opened?,
+    };
     let all = opened.rows();
     let ran = all.iter().filter(|row| !row.was_not_run()).count();
     let counted = || all.iter().filter(|row| row.counts());
     let falls = counted().filter(|row| row.verdict == Some(Verdict::Fall)).count();
     let best = opened.best(&all).and_then(|row| row.value);
     Ok(vec![
-        file.parent().unwrap_or(file).display().to_string(),
-        stored.task.name().to_owned(),
-        stored.seed.to_string(),
+        folder,
+        ours.map_or_else(none, |ours| ours.task.name().to_owned()),
+        ours.map_or_else(none, |ours| ours.seed.to_string()),
         ran.to_string(),
         counted().count().to_string(),
-        falls.to_string(),
-        best.map_or("-".to_owned(), |best| format!("{best:.3} {}", opened.unit())),
+        ours.map_or_else(none, |_| falls.to_string()),
+        best.map_or_else(none, |best| format!("{best:.3} {}", opened.unit()).trim_end().to_owned()),
     ])
 }
 
