@@ -40,15 +40,22 @@ impl RejudgedTrial {
     }
 }
 
-/// Returns in words how many of the trials get another suggested verdict, and how many others another value or reason.
+/// Returns in words how many of the trials get another suggested verdict, how many others another value or reason, and of how many
+/// the recording does not show the verdict.
 pub fn changes_in_words<'a>(trials: impl Iterator<Item = &'a RejudgedTrial> + Clone) -> String {
-    let changed = trials.clone().filter(|trial| trial.new.verdict != trial.old.verdict).count();
-    let differ = trials.clone().filter(|trial| trial.new.differs(&trial.old)).count();
+    let known = trials.clone().filter(|trial| trial.new.verdict.is_some());
+    let changed = known.clone().filter(|trial| trial.new.verdict != trial.old.verdict).count();
+    let differ = known.clone().filter(|trial| trial.new.differs(&trial.old)).count();
     let others = match differ - changed {
         0 => String::new(),
         others => format!(", of {others} others J or the cause"),
     };
-    format!("{changed} of {} suggestions change{others}", trials.count())
+    let all = trials.count();
+    let unknown = match all - known.count() {
+        0 => String::new(),
+        unknown => format!("; {unknown} not known"),
+    };
+    format!("{changed} of {all} suggestions change{others}{unknown}")
 }
 
 /// The recomputed estimate of a trial beside the recorded one; of several rollouts the largest numbers.

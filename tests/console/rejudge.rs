@@ -122,6 +122,16 @@ fn a_trial_that_fell_and_would_not_fall_has_no_verdict() {
     }
 }
 
+/// Regression: a judgement that the recording does not show was counted as a changed one.
+#[test]
+fn a_suggestion_that_is_not_known_is_no_change() {
+    let (program, study) = recorded();
+    let no_end = |tick: Tick| (tick.trial != Some(2) || tick.trial_time_s <= 0.3).then_some(tick);
+    copied(&study.join("session.mcap"), program.path("one-without-end.mcap"), &PARTS, no_end);
+    let table = program.text(&["rejudge", "one-without-end.mcap"]);
+    assert_shows(&table, &["0 of 6 suggestions change; 1 not known; verdicts are those in force"]);
+}
+
 /// Regression: damaged files of the robot were replaced by the built-in robot of its name, without a word.
 #[test]
 fn a_recording_whose_robot_is_damaged_is_not_judged_by_another_one() {
