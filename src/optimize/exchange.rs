@@ -2,6 +2,9 @@
 //! `value_<metric>`, `datetime_start`, `datetime_complete`, `params_<name>`, `user_attrs_<name>`, `state`; every other column
 //! is ignored. In JSON parameters and user attributes may also be the objects `params` and `user_attrs`.
 
+use std::iter::Peekable;
+use std::str::Chars;
+
 use jiff::Timestamp;
 use serde_json::{Map, Value};
 
@@ -113,13 +116,68 @@ pub fn from_json(text: &str) -> Result<Vec<TableTrial>, ExchangeError> {
     list.iter().enumerate().map(object).collect()
 }
 
-/// The value of a cell; Python writes `True`, JSON `true`.
+/// The value of a cell: JSON, or as Python prints it (`True`, `{'kp': 400.0}`), or else text.
 fn plain(cell: &str) -> Value {
-    match cell {
-        "True" => Value::Bool(true),
-        "False" => Value::Bool(false),
-        _ => serde_json::from_str(cell).unwrap_or_else(|_| Value::String(cell.to_owned())),
+    let json = serde_json::from_str(cell).ok();
+    json.or_else(|| python_literal(cell)).unwrap_or_else(|| Value::String(cell.to_owned()))
+}
+
+/// Reads a bool, a list or a dictionary as Python's `repr` prints it (The Python Language Reference, "Literals").
+fn python_literal(cell: &str) -> Option<Value> {
+    if !cell.starts_with(['{', '[', 'T', 'F']) {
+        return None;
     }
+    let (mut json, mut chars) = (String::new(), cell.chars().peekable());
+    while let Some(&first) = chars.peek() {
+        let mut run = |belongs: fn(char) -> bool| {
+            let mut run = String::new();
+            while let Some(next) = chars.next_if(|next| belongs(*next)) {
+                run.push(next);
+            }
+            run
+        };
+        match first {
+            '\'' | '"' => json.push_str(&Value::String(python_string(&mut chars)?).to_string()),
+            // A number, with its exponent.
+            '-' | '0'..='9' => json.push_str(&run(|next| next.is_ascii_digit() || "+-.e".contains(next))),
+            _ if first.is_alphabetic() => json.push_str(match run(char::is_alphabetic).as_str() {
+                "True" => "true",
+                "False" => "false",
+                "None" => "null",
+                _ => return None,
+            }),
+            _ => json.extend(chars.next()),
+        }
+    }
+    serde_json::from_str(&json).ok()
+}
+
+/// Reads a quoted text with its escapes.
+fn python_string(chars: &mut Peekable<Chars>) -> Option<String> {
+    let quote = chars.next()?;
+    let mut text = String::new();
+    loop {
+        match chars.next()? {
+            next if next == quote => return Some(text),
+            '\\' => text.push(match chars.next()? {
+                'n' => '\n',
+                'r' => '\r',
+                't' => '\t',
+                'x' => code_point(chars, 2)?,
+                'u' => code_point(chars, 4)?,
+                'U' => code_point(chars, 8)?,
+                same @ ('\\' | '\'' | '"') => same,
+                _ => return None,
+            }),
+            next => text.push(next),
+        }
+    }
+}
+
+/// Reads a character by its code point in hexadecimal digits.
+fn code_point(chars: &mut Peekable<Chars>, digits: usize) -> Option<char> {
+    let digits: String = chars.by_ref().take(digits).collect();
+    char::from_u32(u32::from_str_radix(&digits, 16).ok()?)
 }
 
 fn trial(row: usize, members: &Map<String, Value>) -> Result<TableTrial, ExchangeError> {

@@ -12,6 +12,7 @@ mod skip;
 mod support;
 
 mod ask_tell;
+mod exchange;
 mod insight;
 mod prior_file;
 mod prior_worlds;
