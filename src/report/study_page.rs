@@ -250,7 +250,8 @@ fn configuration(studies: &[ReportedStudy]) -> Section {
 fn bounds(study: &ReportedStudy) -> String {
     let range = |p: &ParameterInfo| {
         let changed = changed_bounds(p, &study.rows).map_or(String::new(), |changed| format!(" ({changed})"));
-        format!("{} {} to {} {}{changed}", p.name, six_digits(p.low), six_digits(p.high), p.unit)
+        let range = format!("{} {} to {} {}", p.name, six_digits(p.low), six_digits(p.high), p.unit);
+        range.trim_end().to_owned() + &changed
     };
     let ranges: Vec<String> = study.parameters.iter().map(range).collect();
     format!("{}: searched last over {}.", title(study), ranges.join(", "))

@@ -12,10 +12,17 @@ const CHECKPOINTS: [usize; 6] = [5, 10, 20, 50, 100, 200];
 /// Mark of a value that was measured by hand, as in the console.
 const BY_HAND: &str = "h";
 
-/// Decimal places of a parameter: about four significant digits.
+/// Decimal places of a parameter: about four significant digits of its largest value, of its smallest where its range is several powers
+/// of ten.
 fn digits(low: f64, high: f64) -> usize {
     let most = low.abs().max(high.abs());
-    if most < 10.0 { 3 } else { usize::from(most < 1000.0) }
+    let size = if low > 0.0 && high / low >= 1000.0 { low } else { most };
+    match size {
+        _ if size >= 1000.0 => 0,
+        _ if size >= 10.0 => 1,
+        _ if size >= 0.1 || size == 0.0 => 3,
+        _ => 2 + (-size.log10()).ceil() as usize,
+    }
 }
 
 fn parameter_columns(study: &ReportedStudy) -> impl Iterator<Item = Column> {
@@ -61,7 +68,7 @@ pub fn studies(studies: &[ReportedStudy]) -> Table {
         let repeats = study.rows.iter().filter(|row| row.confirms_best());
         let best = study.best_row();
         let cells = [
-            Cell::text(format!("{}, {}", title(study), study.robot)),
+            Cell::text([title(study), study.robot.clone()].join(", ").trim_end_matches(", ")),
             Cell::count(study.trials().count()),
             counted(Verdict::Accept),
             counted(Verdict::Fall),

@@ -328,3 +328,23 @@ fn a_report_names_the_operators_and_the_values_that_they_have_set() {
     let shown = text::render(&study_page::page(&[study], &[], "0.1.0 (test)"), 200);
     assert!(shown.contains("study; quadfrog") && !shown.contains("Values that an operator"), "{shown}");
 }
+
+/// Regression: parameters below 0.001 were 0.000, and a study without robot or unit had a comma or a space at its end.
+#[test]
+fn a_study_of_another_program_is_shown_with_its_digits_and_without_empty_parts() {
+    let parameter = |name: &str, low, high| ParameterInfo { name: name.into(), unit: String::new(), low, high };
+    let ran = TrialRecord { parameters: vec![("lr".into(), 2.5e-5), ("x".into(), 0.5)].into(), ..rows().remove(4) };
+    let other = ReportedStudy {
+        name: "min".into(),
+        task: None,
+        seed: None,
+        robot: String::new(),
+        parameters: vec![parameter("lr", 1e-6, 0.1), parameter("x", 0.0, 1.0)],
+        best: Some(4),
+        ..study(0, vec![ran])
+    };
+    let shown = text::render(&study_page::page(&[other], &[], "0.1.0 (test)"), 200);
+    assert!(shown.contains("0.00002500") && shown.contains("0.500"), "{shown}");
+    assert!(shown.contains("searched last over lr 0.000001 to 0.1, x 0 to 1.\n"), "{shown}");
+    assert!(!shown.contains("min,"), "{shown}");
+}
