@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use crate::optimize::study::ModelBest;
 use crate::optimize::trial::Trial;
+use crate::printable::printable;
 use crate::trial::{
     JudgedBy, JumpRow, ParameterInfo, ParameterValues, ProposalSource, ProposedParameter, TrialRecord, Verdict,
     counted, four_digits, parameter_unit, six_digits,
@@ -20,7 +21,7 @@ fn after_number(row: &TrialRecord, unit: &str, units: &HashMap<String, String>) 
     let mut text = String::new();
     for (name, value) in &row.parameters {
         let of = units.get(name).map_or("", String::as_str);
-        let _ = write!(text, "  {name} {} {of}", parameter_value(*value, of));
+        let _ = write!(text, "  {} {} {of}", printable(name), parameter_value(*value, of));
     }
     if let Some(value) = row.value.filter(|_| row.verdict == Some(Verdict::Accept)) {
         let _ = write!(text, "  {value:.3} {unit}");

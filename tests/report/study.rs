@@ -1,6 +1,6 @@
 //! Derived quantities of a jump, measured from made-up ticks with known answers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 use quadfrog::optimize::ask::Direction;
@@ -347,4 +347,12 @@ fn a_study_of_another_program_is_shown_with_its_digits_and_without_empty_parts()
     assert!(shown.contains("0.00002500") && shown.contains("0.500"), "{shown}");
     assert!(shown.contains("searched last over lr 0.000001 to 0.1, x 0 to 1.\n"), "{shown}");
     assert!(!shown.contains("min,"), "{shown}");
+}
+
+/// Regression: a line break in the name of a parameter of another program broke the line of the best trial.
+#[test]
+fn the_best_trial_is_one_line_whatever_its_parameters_are_called() {
+    let best = TrialRecord { parameters: vec![("two\nlines".into(), 0.5)].into(), ..rows().remove(4) };
+    let line = table::best_line(Some(&best), None, &Vec::new().into(), "m", &HashMap::new());
+    assert!(line.starts_with("Best: trial 4  two lines 0.5 ") && line.lines().count() == 1, "{line}");
 }
