@@ -216,6 +216,12 @@ impl Terrain {
         Vector3::new(v.x, v.y, 0.0)
     }
 
+    /// Whether there are steps or blocks that do not give way.
+    pub fn has_fixed_walls(&self) -> bool {
+        let loose = self.config.kind == TerrainKind::Blocks && self.config.blocks.loose;
+        !self.blocks.is_empty() && !loose
+    }
+
     /// Number of loose blocks that the robot touches or that move.
     pub fn moving_count(&self) -> usize {
         self.moving.len()
