@@ -510,7 +510,7 @@ fn a_terminal_that_shows_no_dialog_opens_no_field() {
             }
         }
     }
-    // A value that is not typed reaches nobody.
+    // Nothing of the value reaches the session.
     let mut console = review();
     console.update(Msg::Resize(40, 10));
     assert_eq!(console.requests(&["=", "0", ".", "5", "Enter"]), []);

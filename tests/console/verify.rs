@@ -202,14 +202,15 @@ fn a_loss_before_a_recovery_is_reported_beside_equal_ticks() {
 fn stopped_and_continued_rollouts_of_a_trial_are_no_difference() {
     let program = Program::new();
     program.write("config/control.toml", "[tasks.forward]\nrepeats = 2\n");
-    let start =
-        |more: &[&str]| Session::start(&program.path("."), (100, 30), &[&["--config", "config"], more].concat());
+    let recordings = program.path("recordings");
+    std::fs::create_dir(&recordings).unwrap();
+    let start = |arguments: &[&str]| Session::start(&recordings, (100, 30), arguments);
     let jump = |session: &mut Session| {
         session.send("A");
         session.wait_for(&["Press g twice"]);
         session.approve();
     };
-    let mut session = start(&[]);
+    let mut session = start(&["--config", "../config"]);
     session.wait_for(&["Press A to arm"]);
     jump(&mut session);
     session.wait_for(&["JUMP"]);

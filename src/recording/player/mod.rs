@@ -326,7 +326,7 @@ impl Player {
         let before = if self.lacks_command(&records) { self.command_before(place, carried) } else { None };
         let mut joiner = TickJoiner::default();
         if let Some((header, data)) = &before {
-            joiner.set_command(header.clone(), data);
+            joiner.set_command(*header, data);
         }
         let mut errors = Vec::new();
         for (header, data) in records.messages().flatten() {
