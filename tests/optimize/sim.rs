@@ -185,6 +185,20 @@ fn where_all_worlds_stand_the_first_jump_is_expected_to_stand() {
     assert!(expected.p_stand > 0.88 && first.p_stand > 0.88, "{expected:?} {first:?}");
 }
 
+/// Regression: with a bound that no point reaches the first jump was the surest one, next to no jump, and advised to end the study.
+#[test]
+fn with_a_bound_beyond_every_point_the_first_jump_is_one_of_the_surest_with_a_gain() {
+    let study = study_of(&RIGHT, SamplerConfig { least_p_stand: 0.999, ..sampler(SamplerKind::Sim, 0) });
+    let draft = study.draft();
+    let chosen = draft.expected.unwrap();
+    let grid =
+        (0..1000).map(|i| [f64::from(i / 100), f64::from(i / 10 % 10), f64::from(i % 10)].map(|u| (u + 0.5) / 10.0));
+    let surest = grid.map(|u| expected_at(&study, &u)).max_by(|a, b| a.p_stand.total_cmp(&b.p_stand)).unwrap();
+    println!("chosen {chosen:?}, surest {surest:?}");
+    assert!(chosen.worth_the_risk && chosen.value > surest.value, "{chosen:?} {surest:?}");
+    assert!(1.0 - chosen.p_stand < 1.5 * (1.0 - surest.p_stand), "{chosen:?} {surest:?}");
+}
+
 #[test]
 fn a_right_simulator_finds_the_best_jump_within_five() {
     let (mut best, mut falls, mut gp) = (0.0, 0, 0.0);

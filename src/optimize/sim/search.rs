@@ -20,6 +20,9 @@ const SURE: f64 = 0.6;
 /// Factor of the accepted probability of a fall where standing is learned without the simulated robots: it is uncertain everywhere but
 /// about the jumps that stood, and with the accepted one the search would stay there.
 const WITHOUT_WORLDS: f64 = 3.0;
+/// Risk of a fall up to which the first jump is chosen by its gain where no point has the accepted one, as a factor of the smallest
+/// risk: the surest point alone may be next to no jump.
+const NEARLY_SUREST: f64 = 1.25;
 /// Smallest J*, in scaled units.
 const LEAST_STAR: f64 = 1e-3;
 /// Half widths of the local rounds, as shares of the box.
@@ -121,18 +124,21 @@ impl<'a> Acquisition<'a> {
         // All stood by luck: the surest of them, less a unit.
         let lucky = || stood.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(mean, _)| mean - 1.0);
         let incumbent = safe.or_else(lucky);
-        let star = match incumbent {
-            Some(incumbent) => incumbent - origin,
+        let accepted = 1.0 - config.least_p_stand;
+        let accepted = if standing.has_worlds() { accepted } else { WITHOUT_WORLDS * accepted };
+        let (star, accepted) = match incumbent {
+            Some(incumbent) => (incumbent - origin, accepted),
             None => {
-                let gains = candidates.iter().map(|(x, f)| at(x, f)).map(|(mean, p)| p * (mean - origin));
-                gains.fold(0.0, f64::max)
+                let expected: Vec<(f64, f64)> = candidates.iter().map(|(x, f)| at(x, f)).collect();
+                let star = expected.iter().map(|(mean, p)| p * (mean - origin)).fold(0.0, f64::max);
+                let smallest = expected.iter().map(|(_, p)| 1.0 - p).fold(1.0, f64::min);
+                (star, accepted.max(NEARLY_SUREST * smallest))
             }
         };
         let value = value.believing(&history.pending)?;
         let price = config.fall_price * pow(ESCALATION, history.falls_in_a_row() as f64);
         let avoided = history.void.iter().chain(history.pending.iter().map(|(x, _)| x)).cloned().collect();
-        let accepted = 1.0 - config.least_p_stand;
-        let least = 1.0 - if standing.has_worlds() { accepted } else { WITHOUT_WORLDS * accepted };
+        let least = 1.0 - accepted;
         let star = star.max(LEAST_STAR);
         Some(Acquisition { prior, ensemble, value, standing, incumbent, star, origin, price, least, avoided })
     }
