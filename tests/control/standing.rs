@@ -92,10 +92,10 @@ fn damping_needs_no_network() {
 #[test]
 fn the_gate_keeps_damping_within_the_torque_limit() {
     let (_, _, settings) = bench::shipped(quadfrog::trial::Backend::Hardware);
-    for torque_n_m in [-60.0, -20.0, 0.0, 5.0, 20.0, 60.0] {
+    for asked_n_m in [-60.0, -20.0, 0.0, 5.0, 20.0, 60.0] {
         for dq in [-60.0, -25.0, -1.0, 0.0, 3.0, 25.0, 60.0] {
             let state = RobotState { joint_velocity_rad_s: [dq; JOINTS], ..RobotState::default() };
-            let wanted = JointCommand::damped_torques(&[torque_n_m; JOINTS], 2.0, &[dq; JOINTS]);
+            let wanted = JointCommand::damped_torques(&[asked_n_m; JOINTS], 2.0, &[dq; JOINTS]);
             let mut gate = CommandGate::default();
             let passed = gate.pass(&wanted, &state, &settings);
             for (joint, motor) in passed.command.motor.iter().enumerate() {
@@ -105,10 +105,10 @@ fn the_gate_keeps_damping_within_the_torque_limit() {
                     torque_n_m.abs() <= most + 1e-9 && kp_joint == 0.0 && (0.0..=2.0).contains(&kd_joint),
                     "{motor:?}"
                 );
-                let expected = torque_n_m.clamp(-most, most);
-                assert!((motor.torque_at(0.0, dq) - expected).abs() < 1e-9, "{torque_n_m} at {dq}: {motor:?}");
+                let expected = asked_n_m.clamp(-most, most);
+                assert!((motor.torque_at(0.0, dq) - expected).abs() < 1e-9, "{asked_n_m} at {dq}: {motor:?}");
                 let limited = passed.limited >> joint & 1 == 1;
-                assert_eq!(limited, torque_n_m.abs() > most, "{torque_n_m} at {dq}");
+                assert_eq!(limited, asked_n_m.abs() > most, "{asked_n_m} at {dq}");
             }
         }
     }
