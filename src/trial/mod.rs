@@ -237,6 +237,11 @@ impl Proposal {
         self.parameters.iter().chain(&self.gains).filter(|p| p.value != p.proposed)
     }
 
+    /// Returns the gains that have another value than the proposed one.
+    pub fn changed_gains(&self) -> impl Iterator<Item = &ProposedParameter> {
+        self.gains.iter().filter(|gain| gain.value != gain.proposed)
+    }
+
     /// Returns the proposed values of the parameters and gains that have another one.
     pub fn replaced(&self) -> ParameterValues {
         self.changed().map(|p| (p.name.clone(), p.proposed)).collect()

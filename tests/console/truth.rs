@@ -362,14 +362,20 @@ fn an_answer_of_the_session_before_is_not_shown_in_the_next() {
     assert!(console.model.message.is_none());
 }
 
-/// Regression: the details of a trial whose verdict could be undone said that its value was reported.
-#[test]
-fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() {
+/// A console in `stage` after trial 0 was accepted, which can still be undone.
+fn with_accepted_trial(stage: ExperimentStage) -> Console {
     let mut console = Console::ready();
     console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
     console.stage(ExperimentStage::Review, 0);
     console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
-    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Proposed, trial: 1, can_undo: true, jumps: 0 }));
+    console.record(Record::Stage(StageRecord { stage, trial: 1, can_undo: true, jumps: 0 }));
+    console
+}
+
+/// Regression: the details of a trial whose verdict could be undone said that its value was reported.
+#[test]
+fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() {
+    let mut console = with_accepted_trial(ExperimentStage::Proposed);
     console.press(&["2", "Enter"]);
     assert_shows(&console.screen(120, 40), &["reported to the optimizer once it cannot be undone"]);
     console.stage(ExperimentStage::Running, 1);
@@ -380,11 +386,7 @@ fn the_details_say_that_a_value_is_reported_once_its_verdict_cannot_be_undone() 
 /// Regression: the replay of a finished study said of a value that it is reported once its verdict cannot be undone.
 #[test]
 fn a_replay_says_of_no_value_that_it_waits_for_the_optimizer() {
-    let mut console = Console::ready();
-    console.record(Record::Trial(trial(0, None, Some(Verdict::Accept))));
-    console.stage(ExperimentStage::Review, 0);
-    console.record(Record::Trial(trial(0, Some(Verdict::Accept), Some(Verdict::Accept))));
-    console.record(Record::Stage(StageRecord { stage: ExperimentStage::Finished, trial: 1, can_undo: true, jumps: 0 }));
+    let mut console = with_accepted_trial(ExperimentStage::Finished);
     console.update(Msg::Replay(ReplayStatus::default()));
     console.press(&["2", "Enter"]);
     let screen = console.screen(120, 40);

@@ -19,7 +19,7 @@ const MAX_CONTACTS: usize = 40;
 const FASTEST_RECOVERY_M_S: f64 = 1.0;
 /// The same where steps or fixed blocks have walls. A leg can be in two walls that face each other: no velocity leaves both, the impulses
 /// grow with each sweep, and their friction makes energy. Of 200 tumbles without commands among blocks one had 44 times its energy with
-/// 1 m/s; with 0.1 m/s, as without any recovery, none had more than 1.05 times.
+/// 1 m/s; with 0.1 m/s, as without any recovery, none had more than 1.05 times. On other ground no contacts face each other.
 const FASTEST_RECOVERY_AT_WALLS_M_S: f64 = 0.1;
 /// A stop and a friction row per joint.
 const MAX_JOINT_ROWS: usize = 2 * JOINTS;

@@ -172,7 +172,7 @@ impl SessionModel {
     /// Returns the rows of the panel of the trial: its heading, parameters and gains, what is expected, the repeats.
     pub fn trial_rows(&self) -> u16 {
         let parameters = self.info.parameters.len().max(3) as u16;
-        let changed = |proposal: &Proposal| proposal.gains.iter().filter(|gain| gain.value != gain.proposed).count();
+        let changed = |proposal: &Proposal| proposal.changed_gains().count();
         let gains = match self.stage_is(ExperimentStage::Finished) {
             true => self.changed_gains_of_best().len(),
             false => self.open_proposal().map_or(0, changed),

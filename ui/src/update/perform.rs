@@ -281,8 +281,7 @@ fn bounds(model: &mut Model) {
 
 /// The values of a proposal as a point for the queue: its parameters, and the gains that were changed.
 pub(super) fn queued_values(proposal: &Proposal) -> Vec<(String, f64)> {
-    let gains = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
-    proposal.parameters.iter().chain(gains).map(|p| (p.name.clone(), p.value)).collect()
+    proposal.parameters.iter().chain(proposal.changed_gains()).map(|p| (p.name.clone(), p.value)).collect()
 }
 
 /// Enter: overrides, goes to the trial of a replay or opens the details. It never starts motion and acknowledges no stop: it may

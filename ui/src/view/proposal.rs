@@ -113,8 +113,7 @@ fn content(model: &Model, width: usize) -> PanelText {
             };
             let title = format!("Trial #{}{repeat}{source}", proposal.trial);
             let mut lines: Vec<Line> = proposal.parameters.iter().map(|p| proposed(session, theme, p, width)).collect();
-            let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
-            lines.extend(changed.map(|gain| parameter(session, theme, gain, width)));
+            lines.extend(proposal.changed_gains().map(|gain| parameter(session, theme, gain, width)));
             lines.extend(expected(session, theme, proposal.expected));
             if let Some(fallen) = void_fall(session, proposal) {
                 lines.push(Line::from(span(theme, Role::Warning, format!(" this point fell in #{fallen}"))));

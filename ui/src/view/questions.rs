@@ -94,8 +94,7 @@ pub fn approve(model: &Model, trial: u32, waited: bool, area_clear: bool) -> Vec
             let before = if p.value == p.proposed { String::new() } else { format!(" (was {})", number(p.proposed)) };
             format!("{} {} {unit}{before}", p.name, number(p.value))
         };
-        let changed = proposal.gains.iter().filter(|gain| gain.value != gain.proposed);
-        let values: Vec<String> = proposal.parameters.iter().chain(changed).map(value).collect();
+        let values: Vec<String> = proposal.parameters.iter().chain(proposal.changed_gains()).map(value).collect();
         lines.push(Line::from(format!("Trial #{trial}: {}", values.join(", "))));
     }
     lines.push(Line::from(match area_clear {

@@ -71,13 +71,12 @@ pub fn lines(model: &Model, selected: usize, width: usize) -> (Vec<Line<'static>
 /// Returns the point that the open proposal runs in place of the queued one: with the operator's changes.
 fn proposed(proposal: &Proposal) -> QueuedPoint {
     let value = |p: &ProposedParameter| (p.name.clone(), p.value);
-    let changed = |gain: &&ProposedParameter| gain.value != gain.proposed;
     QueuedPoint {
         trial: proposal.trial,
         source: proposal.source,
         parent: proposal.parent,
         parameters: proposal.parameters.iter().map(value).collect(),
-        gains: proposal.gains.iter().filter(changed).map(value).collect(),
+        gains: proposal.changed_gains().map(value).collect(),
     }
 }
 
