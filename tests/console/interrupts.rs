@@ -1,7 +1,7 @@
 //! Signals that end a command without a screen: nothing half-written stays, and `optimize` keeps the ticks of its best trial.
 
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -56,6 +56,27 @@ fn a_signal_leaves_no_lock_of_a_journal() {
             let files = names_in(&program.study("recordings"));
             assert!(!files.iter().any(|name| name.starts_with("study.log.lock")), "{signal}: {files:?}");
         }
+    }
+}
+
+/// Regression: `optimize | head -1` ran all trials for nobody.
+#[test]
+fn a_study_ends_with_the_reader_of_its_trials() {
+    for format in [&["--json"][..], &[]] {
+        let program = Program::new();
+        let long = ["optimize", "--seed", "0", "--trials", "3000"];
+        let mut command = program.command(&[&long[..], format].concat());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let (mut first, mut messages) = (String::new(), child.stderr.take().unwrap());
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+        let mut ended = Ended(child);
+        assert_eq!(ended.0.wait().unwrap().code(), Some(128 + Signal::SIGPIPE as i32), "{format:?}");
+        let mut message = String::new();
+        messages.read_to_string(&mut message).unwrap();
+        assert_shows(&message, &["the reader of standard output has ended", "--resume recordings/"]);
+        assert_eq!(message.matches("the reader").count(), 1, "{message}");
+        let study = program.study("recordings");
+        program.text(&["verify", study.to_str().unwrap()]);
     }
 }
 

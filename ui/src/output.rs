@@ -5,6 +5,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use quadfrog::printable::is_unprintable;
@@ -14,6 +15,9 @@ use crate::wrap::{wrap, wrap_sentence};
 
 /// The first error of standard output; a reader that has closed the pipe is none.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// Whether the reader has closed the pipe.
+static READER_ENDED: AtomicBool = AtomicBool::new(false);
 
 /// Returns the text with every character that is not printed, but line feed and tab, as `\u001b`, which JSON strings allow, too.
 pub fn printable(text: &str) -> Cow<'_, str> {
@@ -68,10 +72,12 @@ impl Write for Data {
 
 fn write(bytes: &[u8]) {
     let mut output = io::stdout().lock();
-    if let Err(error) = output.write_all(bytes).and_then(|()| output.flush())
-        && error.kind() != ErrorKind::BrokenPipe
-    {
-        FAILED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    match output.write_all(bytes).and_then(|()| output.flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => READER_ENDED.store(true, Ordering::Release),
+        Err(error) => {
+            FAILED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        }
     }
 }
 
@@ -111,6 +117,12 @@ pub fn wrapped_text(text: &str, indent: usize) {
 fn columns(is_terminal: bool) -> Option<usize> {
     let (columns, _) = crossterm::terminal::size().ok().filter(|_| is_terminal)?;
     Some(usize::from(columns)).filter(|columns| *columns > 0)
+}
+
+/// Whether the reader of standard output has closed the pipe, as `head` does when it has read enough. Known after the first write
+/// that it missed.
+pub fn reader_has_ended() -> bool {
+    READER_ENDED.load(Ordering::Acquire)
 }
 
 /// Returns the first error of standard output, for example a full disk.

@@ -261,6 +261,7 @@ impl StudyRunner<'_> {
             let JudgedTrial { experiment, row, warning, .. } = trial;
             if row.verdict.is_some() {
                 printer.trial(study, row, experiment.counted());
+                stop.end_with_reader(printer.printer_of_notices());
             }
             if let Some(warning) = warning {
                 printer.warn(study, warning);

@@ -1,4 +1,5 @@
-//! The end of studies by a signal: each ends after its present trial, with a whole recording; a second signal ends the program at once.
+//! The end of studies by a signal, or with the reader of their trials: each ends after its present trial, with a whole recording; a
+//! second signal ends the program at once.
 
 use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -6,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nix::sys::signal::Signal;
 use quadfrog::optimize::journal::JournalWait;
 
+use crate::output;
 use crate::subcommand::interrupt::{AfterSignal, at_first_signal};
 
 #[derive(Debug, Default)]
@@ -28,6 +30,14 @@ impl StudiesStop {
         let set = Arc::clone(&stop);
         at_first_signal(move |signal| set.set(signal, print));
         stop
+    }
+
+    /// Sets the stop as SIGPIPE does if the reader of standard output has ended; the trials would run for nobody.
+    pub fn end_with_reader(&self, print: impl Fn(&str)) {
+        let begin = |signal| self.signal.compare_exchange(0, signal, Ordering::AcqRel, Ordering::Acquire).is_ok();
+        if output::reader_has_ended() && begin(Signal::SIGPIPE as i32) {
+            print("the reader of standard output has ended: the present trial and its recording are completed");
+        }
     }
 
     /// Returns the signal that has set it.
