@@ -22,8 +22,8 @@ pub use folder::{
 pub use ground::TrialGround;
 pub use guard::{GUARD, Guard, GuardError, GuardHeartbeat, GuardOrders, GuardOutcome, run_guard, run_guard_with};
 pub use observers::{
-    FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, STOP_BY, SessionFacts, SessionNews,
-    WHO_WATCHES, find_sessions,
+    FoundSessions, Observer, ObserverServer, ObserverStatus, RunningSession, SessionFacts, SessionNews, WHO_WATCHES,
+    find_sessions, is_stop_of_observer,
 };
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use super::guard::{Guard, GuardState};
-use super::observers::{STOP_BY, SessionNews};
+use super::observers::SessionNews;
 use crate::optimize::journal::LOCK_GRACE;
 use crate::realtime::clock::{Clock, MonotonicClock};
 use crate::realtime::sleep_lock::{ALLOW_INHIBITOR, SleepLock};
@@ -25,9 +25,9 @@ const LONGEST_STOP: Duration = Duration::from_secs(2);
 /// stored then was judged and is on disk, and is reported when the study is opened again.
 const LONGEST_CLOSE: Duration = Duration::from_secs(LOCK_GRACE.as_secs() + 5);
 
-/// Runs the session until the console drops its handle; `news` of its observers go to the log. Returns the supervisor with the session's channel ends, because a
-/// control thread takes their loss for a crash of the session, and the guard, because the control thread commands the
-/// robot until its own end.
+/// Runs the session until the console drops its handle; `news` of its observers go to the log. Returns the supervisor with the
+/// session's channel ends, because a control thread takes their loss for a crash of the session, and the guard, because the control
+/// thread commands the robot until its own end.
 pub fn run(
     mut supervisor: Supervisor,
     mut guard: Option<Guard>,
@@ -43,10 +43,11 @@ pub fn run(
     }
     loop {
         // Before the trial that an observer has stopped is measured.
-        for (level, message) in news.try_iter() {
-            if let Some(observer) = message.strip_prefix(STOP_BY) {
-                supervisor.stopped_by(observer.to_owned(), clock.now_ns());
+        for news in news.try_iter() {
+            if let SessionNews::Stop(observer) = &news {
+                supervisor.stopped_by(observer.clone(), clock.now_ns());
             }
+            let (level, message) = news.line();
             supervisor.log(level, message, clock.now_ns());
         }
         supervisor.poll(clock.now_ns());

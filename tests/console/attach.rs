@@ -114,6 +114,28 @@ fn a_colleague_watches_a_session_and_stops_its_robot() {
     assert!(lab.sockets().is_empty() && lab.listed().is_empty());
 }
 
+/// Regression: the operator's own STOP was attributed to an observer called "STOP by Eve" who had just come.
+#[test]
+fn an_observer_called_as_a_stop_has_not_stopped_the_trial() {
+    let lab = Lab::new();
+    let mut session = lab.session("studies", &[]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    session.approve();
+    session.wait_for(&["JUMP"]);
+    let mut named = UnixStream::connect(lab.sockets().remove(0)).unwrap();
+    named.write_all(b"{\"watch\":\"STOP by Eve\"}\n").unwrap();
+    std::thread::sleep(Duration::from_millis(50));
+    session.send(" ");
+    session.wait_for(&["DAMPED"]);
+    session.send("2");
+    session.wait_for(&["STOP was pressed"]);
+    assert!(!session.screen().contains("pressed by"), "{}", session.screen());
+    session.send("6");
+    session.wait_for(&["STOP by Eve watches this session"]);
+    assert!(session.quit().success());
+}
+
 /// Regression: an observer that left within 10 ms of its STOP had not sent it.
 #[test]
 fn an_observer_that_leaves_at_once_has_sent_its_stop() {

@@ -494,6 +494,23 @@ fn the_stop_of_an_observer_names_who_stopped() {
     }
 }
 
+/// Regression: the arrival of an observer called "STOP by Eve" replaced the cause of the stop.
+#[test]
+fn an_observer_called_as_a_stop_is_none() {
+    let mut console = Console::ready();
+    console.mode(Mode::Countdown);
+    console.record(Record::Transition(Transition {
+        from: Mode::Countdown,
+        to: Mode::Damped,
+        cause: "the link is lost".to_owned(),
+    }));
+    let message = "STOP by Eve, who watches this session".to_owned();
+    console.record(Record::Log(LogRecord { level: LogLevel::Info, source: "session".into(), message }));
+    let tick = Tick { mode: Mode::Damped, ..console.model.snapshot.tick };
+    console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+    assert_shows(&console.next_step(), &["k acknowledges: the link is lost"]);
+}
+
 /// The warning of a wait for the simulated robots stayed in the last line after their prior was made.
 #[test]
 fn the_end_of_a_wait_for_the_study_takes_the_place_of_its_warning() {

@@ -24,14 +24,36 @@ pub use server::ObserverServer;
 /// Longest line either end accepts, bytes.
 const LONGEST_LINE: u64 = 16_384;
 
-/// Begin of the message about a STOP of an observer; the name follows.
-pub const STOP_BY: &str = "STOP by ";
+/// Begin of the warning about a STOP of an observer; the name follows.
+const STOP_BY: &str = "STOP by ";
 
 /// End of that message.
 pub const WHO_WATCHES: &str = ", who watches this session";
 
-/// Log line about an observer, for the session.
-pub type SessionNews = (LogLevel, String);
+/// News of the observers, for the session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SessionNews {
+    /// An observer has set STOP; its name with [`WHO_WATCHES`].
+    Stop(String),
+    /// An observer has come or gone; a line for the log.
+    Attendance(String),
+}
+
+impl SessionNews {
+    /// Returns the line of the log.
+    pub fn line(self) -> (LogLevel, String) {
+        match self {
+            SessionNews::Stop(observer) => (LogLevel::Warning, format!("{STOP_BY}{observer}")),
+            SessionNews::Attendance(line) => (LogLevel::Info, line),
+        }
+    }
+}
+
+/// Whether a line of the session's log, or the message with it, is that of [`SessionNews::Stop`]. The text alone does not say it: an
+/// observer may be called so.
+pub fn is_stop_of_observer(level: LogLevel, text: &str) -> bool {
+    level == LogLevel::Warning && text.starts_with(STOP_BY)
+}
 
 /// Facts of a running session, for those who want to observe it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -8,10 +8,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-use super::{Answer, Demand, STOP_BY, SessionFacts, SessionNews, WHO_WATCHES, line, make_socket_folder, read_message};
+use super::{Answer, Demand, SessionFacts, SessionNews, WHO_WATCHES, line, make_socket_folder, read_message};
 use crate::printable::is_unprintable;
 use crate::realtime::channel::StopLatch;
-use crate::recording::record::LogLevel;
 
 /// Most connections at a time; further ones are closed.
 const MOST_OBSERVERS: usize = 8;
@@ -118,7 +117,7 @@ fn serve(stream: &UnixStream, shared: &Shared) {
     let _ = converse(stream, shared, &mut name);
     if let Some(name) = name {
         shared.observers.fetch_sub(1, Ordering::Relaxed);
-        shared.report(LogLevel::Info, format!("{name} does not watch any longer"));
+        shared.report(SessionNews::Attendance(format!("{name} does not watch any longer")));
     }
 }
 
@@ -138,7 +137,7 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
                 // A press of a key may demand it twice, by the thread that reads the keys and by the screen.
                 if reported.is_none_or(|reported| reported.elapsed() > ONE_PRESS) {
                     let by = name.as_deref().unwrap_or("an observer");
-                    shared.report(LogLevel::Warning, format!("{STOP_BY}{by}{WHO_WATCHES}"));
+                    shared.report(SessionNews::Stop(format!("{by}{WHO_WATCHES}")));
                     reported = Some(Instant::now());
                 }
                 writer.write_all(&line(&Answer::Stopped)?)?;
@@ -146,7 +145,7 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
             Demand::Watch(of) if name.is_none() => {
                 let of: String = of.chars().filter(|c| !is_unprintable(*c)).take(LONGEST_NAME).collect();
                 shared.observers.fetch_add(1, Ordering::Relaxed);
-                shared.report(LogLevel::Info, format!("{of} watches this session"));
+                shared.report(SessionNews::Attendance(format!("{of} watches this session")));
                 *name = Some(of);
             }
             Demand::Watch(_) => {}
@@ -157,7 +156,7 @@ fn converse(stream: &UnixStream, shared: &Shared, name: &mut Option<String>) -> 
 
 impl Shared {
     /// Reports to the session's log; at its end there is none.
-    fn report(&self, level: LogLevel, message: String) {
-        let _ = self.news.send((level, message));
+    fn report(&self, news: SessionNews) {
+        let _ = self.news.send(news);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadfrog::engine::STOP_BY;
+use quadfrog::engine::is_stop_of_observer;
 use quadfrog::recording::record::{
     LogLevel, LogRecord, Record, RequestRecord, SessionInfo, StageRecord, Stamped, Transition,
 };
@@ -180,7 +180,7 @@ fn change_mode(model: &mut Model, time_ns: u64, change: &Transition) -> Option<B
         model.session.sat_down_because.clear();
     }
     // The observer who stopped may have been reported before the stop.
-    let by_observer = |message: &&Notice| message.stop && message.text.starts_with(STOP_BY);
+    let by_observer = |message: &&Notice| message.stop && is_stop_of_observer(message.level, &message.text);
     let by_observer = model.message.as_ref().filter(by_observer).filter(|_| change.is_stop());
     if matches!(change.to, Mode::Damped | Mode::Fault) {
         model.session.stopped_because = by_observer.map_or(&change.cause, |message| &message.text).clone();
@@ -282,7 +282,7 @@ fn log_line(model: &mut Model, time_ns: u64, line: LogRecord) {
     if line.level > LogLevel::Info || wait_ended {
         say(model, line.level, line.message.clone());
     }
-    if line.source == "session" && line.message.starts_with(STOP_BY) {
+    if line.source == "session" && is_stop_of_observer(line.level, &line.message) {
         model.message.iter_mut().for_each(|message| message.stop = true);
         model.session.stopped_because.clone_from(&line.message);
     }
