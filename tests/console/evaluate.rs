@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-use crate::program::{Program, without_threads};
+use crate::program::{Program, assert_shows, without_threads};
 use serde_json::Value;
 
 fn evaluate(arguments: &[&str]) -> Output {
@@ -177,22 +177,41 @@ fn a_duration_counts_the_jumps_that_begin_within_it() {
 fn wrong_input_is_refused_with_name_value_and_remedy() {
     for (arguments, parts) in [
         (vec![], vec!["there is no point", "[first.forward]"]),
-        (vec!["--point", "f0=1.3,Fq=3"], vec!["no parameter Fq", "Fz"]),
+        (vec!["--point", "f0=1.3,Fq=3"], vec!["no parameter Fq", "there are Fx, Fy, Fz, f0"]),
         (vec!["--point", "f0=1.3,Fx=1e9"], vec!["Fx = 1000000000", "outside"]),
         (vec!["--point", "Fx=40"], vec!["f0 is missing"]),
         (vec!["--point", "f0=abc"], vec!["abc", "not a number"]),
-        (vec!["--point", "f0=1.3", "--duration", "5"], vec!["--duration", "f1"]),
+        (vec!["--point", "f0=1.3,Fx=40,Fz=210", "--duration", "5"], vec!["--duration", "f1"]),
         (vec!["--point", "f0=1.3,f0=1.5"], vec!["f0 is given twice"]),
         (vec!["--point", "best"], vec!["--point best", "--config"]),
         (vec!["--point", "f0=1.3", "--vmc", "maybe"], vec!["maybe", "on,off"]),
         (vec!["--point", "f0=1.3", "--friction", "a"], vec!["--friction", "give numbers, for example 0.4,0.6,1.0"]),
-        (vec!["--point", "f0=1.3", "--friction", "99"], vec!["--friction 99", "0 to 10"]),
+        (vec!["--point", "f0=1.3,Fx=40,Fz=210", "--friction", "99"], vec!["--friction 99", "0 to 10"]),
     ] {
         let output = evaluate(&arguments);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(parts.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
     }
+}
+
+/// Regression: without f0 an impulse had no end and the command neither, with ticks in memory; a force that was left out was 0 N
+/// without a word.
+#[test]
+fn a_point_without_a_frequency_or_a_force_is_refused() {
+    let program = Program::new();
+    program.write("f0/optimize.toml", "[first.forward]\nFx = 100.0\nFz = 250.0\n");
+    program.write("Fz/optimize.toml", "[first.forward]\nf0 = 1.3\nFx = 100.0\n");
+    for (arguments, parts) in [
+        (["--config", "f0"], ["[first.forward] in optimize.toml: f0 is missing", "--point"]),
+        (["--config", "Fz"], ["[first.forward] in optimize.toml: Fz is missing", "a force of forward"]),
+        (["--point", "f0=1.3"], ["--point f0=1.3: Fx is missing", "0 for none"]),
+        (["--point", "f0=1.3,Fx=40"], ["--point f0=1.3,Fx=40: Fz is missing", "a force of forward"]),
+    ] {
+        assert_shows(&program.refused(&[&["evaluate"], &arguments[..]].concat()), &parts);
+    }
+    // A force of another task is 0 unless it is given.
+    assert_eq!(program.trials(&["evaluate", "--point", "f0=1.3,Fx=0,Fz=210", "--json"]).len(), 1);
 }
 
 /// Regression: a repeated seed or variant counted as a run of its own.

@@ -95,6 +95,7 @@ pub fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     let Source { config, robot, task, .. } = &source;
     let control = config.task(*task);
     let (point, gains) = point(arguments, &source)?;
+    require_whole(&point, arguments.point.as_deref(), &source)?;
     let jump = JumpParameters::from_values(&point, control.f1_hz);
     let mut spec = TrialSpec { gains: control.gains().with(&gains).with(&point), ..control.trial(*task, jump) };
     if let Some(duration_s) = arguments.duration {
@@ -214,7 +215,8 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterVal
     match arguments.point.as_deref() {
         Some("best") => best(source),
         Some(text) => {
-            let known: Vec<&String> = config.optimize.bounds.keys().collect();
+            let known: Vec<&str> = config.optimize.bounds.keys().map(String::as_str).collect();
+            let known = known.join(", ");
             let mut values = Vec::new();
             for part in text.split(',') {
                 let (name, value) = part.split_once('=').ok_or_else(|| {
@@ -225,7 +227,7 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterVal
                 let number =
                     number.ok_or_else(|| Failure::input(format!("--point: {name} = {value} is not a number")))?;
                 let Some([least, most]) = config.limits(*task, name) else {
-                    return Err(Failure::input(format!("--point: there is no parameter {name}; there are {known:?}")));
+                    return Err(Failure::input(format!("--point: there is no parameter {name}; there are {known}")));
                 };
                 if !(least..=most).contains(&number) || (name == "f0" && number <= 0.0) {
                     let message =
@@ -236,9 +238,6 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterVal
                     return Err(Failure::input(format!("--point: {name} is given twice")));
                 }
                 values.push((name.to_owned(), number));
-            }
-            if !values.iter().any(|(name, _)| name == "f0") {
-                return Err(Failure::input(format!("--point {text}: f0 is missing, the frequency of the impulse")));
             }
             Ok((values.into(), ParameterValues::default()))
         }
@@ -254,6 +253,25 @@ fn point(arguments: &EvaluateArguments, source: &Source) -> Result<(ParameterVal
             Ok((first, ParameterValues::default()))
         }
     }
+}
+
+/// Refuses a point without the frequency of the impulse, which would have no end, or without a force that the task optimizes, which
+/// would be 0. `given` is that of the command line.
+fn require_whole(point: &ParameterValues, given: Option<&str>, source: &Source) -> Result<(), Failure> {
+    let Source { config, task, .. } = source;
+    let forces = ["Fx", "Fy", "Fz"].into_iter().filter(|force| config.optimizes(*task, force));
+    let Some(missing) = std::iter::once("f0").chain(forces).find(|name| point.get(name).is_none()) else {
+        return Ok(());
+    };
+    let place = match given {
+        Some(text) => format!("--point {text}"),
+        None => format!("[first.{}] in optimize.toml", task.name()),
+    };
+    let what =
+        if missing == "f0" { "the frequency of the impulse".to_owned() } else { format!("a force of {}", task.name()) };
+    Err(Failure::input(format!(
+        "{place}: {missing} is missing, {what}; a run needs the frequency and every force, 0 for none: --point f0=..,Fx=..,Fz=.."
+    )))
 }
 
 /// Returns the parameters and the gains of the best trial of the study. Says which gains are not those of the configuration.
