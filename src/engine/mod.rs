@@ -28,7 +28,7 @@ pub use observers::{
 pub use options::{EngineError, Options, Provenance};
 pub use prior::{PRIOR_FILE, PriorFileError, PriorMaker, ReadyPrior, prior_plan};
 pub use recording::create_recording;
-pub use rejudging::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words};
+pub use rejudging::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words, config_for_recorded};
 pub use stored::{Opened, StoredStudy, has_journal, named_studies, open_stored, stored_studies, stored_study};
 pub use study::{check_backend, check_budget, open_experiment, open_study, session_info, study_name};
 pub use threads::{EngineThreads, ScheduledSettings};

@@ -1,7 +1,7 @@
 //! The trials of a recording judged again by another configuration: estimate, fall detection and objective on the recorded ticks.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
@@ -13,7 +13,7 @@ use crate::control::settings::ControlSettings;
 use crate::recording::RecordingError;
 use crate::recording::player::{Damage, MOST_TICKS_OF_A_ROLLOUT, Played};
 use crate::recording::timeline::Timeline;
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{RobotDescription, RobotFiles};
 use crate::session::rejudge::{Judgement, rejudge, row_of_repeat};
 use crate::telemetry::{Mode, Tick};
 use crate::trial::{Backend, JumpParameters, ObjectiveRule, TrialRecord, Verdict};
@@ -79,6 +79,26 @@ pub enum RejudgeError {
     Config(#[from] ConfigError),
     #[error("{}: not judged again: {reason}", path.display())]
     NotRejudgeable { path: PathBuf, reason: String },
+}
+
+/// Loads the configuration by which a recording is judged again: that of `folder`, else the built-in one, with the own configuration of
+/// a built-in robot that was recorded below it.
+///
+/// # Errors
+/// When the recording cannot be opened or the configuration cannot be used.
+pub fn config_for_recorded(files: &[PathBuf], folder: Option<&Path>) -> Result<Config, RejudgeError> {
+    let mut recording = Timeline::open(files)?;
+    let name = recording.session().robot.clone();
+    // An older recording has no robot of its own: that of its name.
+    let recorded = attached_robot(recording.first_player()).ok();
+    let built_in = RobotFiles::embedded(&name).ok().filter(|files| match (&recorded, files.description()) {
+        (Some(recorded), Ok(built_in)) => built_in.is_same_robot(recorded),
+        (recorded, _) => recorded.is_none(),
+    });
+    Ok(match built_in {
+        Some(robot) => Config::load_for(&robot, folder)?,
+        None => Config::load(folder)?,
+    })
 }
 
 /// Iterator over the judged trials of a recording. A trial that ran more than once comes once for each run; the last one counts.

@@ -41,6 +41,21 @@ fn ticks() -> BTreeMap<u32, Vec<Tick>> {
     trials
 }
 
+/// Regression: a Go2 was judged with the Go1's threshold of a contact and limits, without a word, and its estimate was recomputed.
+#[test]
+fn a_built_in_robot_is_judged_again_with_its_own_configuration() {
+    let program = Program::new();
+    program.text(&["optimize", "--model", "go2", "--trials", "1", "--seed", "0", "--record", "all"]);
+    program.write("mine/safety.toml", "[fall]\nroll_rad = 0.9\n");
+    let study = program.study("recordings");
+    let rejudge = ["rejudge", study.to_str().unwrap()];
+    for more in [&[][..], &["--config", "mine"]] {
+        let text = program.text(&[&rejudge[..], more].concat());
+        assert_shows(&text, &["+0.0000", "0 of 1 suggestions change"]);
+        assert!(!text.contains("recomputed"), "{more:?}: {text}");
+    }
+}
+
 #[test]
 fn the_same_configuration_gives_the_same_judgement_and_leaves_the_file() {
     let (program, study) = recorded();

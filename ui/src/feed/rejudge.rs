@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use quadfrog::config::Config;
-use quadfrog::engine::Rejudging;
+use quadfrog::engine::{Rejudging, config_for_recorded};
 
 use crate::message::RejudgeNews;
 
@@ -32,7 +31,7 @@ pub fn rejudge(files: Vec<PathBuf>, folder: Option<PathBuf>) -> Receiver<Rejudge
 /// # Errors
 /// The reason when the configuration or the recording cannot be used.
 fn judge(files: &[PathBuf], folder: Option<PathBuf>, news: &Sender<RejudgeNews>) -> Result<(), String> {
-    let config = Config::load(folder.as_deref()).map_err(|error| error.to_string())?;
+    let config = config_for_recorded(files, folder.as_deref()).map_err(|error| error.to_string())?;
     let rejudging = Rejudging::open(files, &config).map_err(|error| error.to_string())?;
     let configuration = folder.map_or("the defaults".to_owned(), |folder| folder.display().to_string());
     let (unit, trials) = (rejudging.unit().to_owned(), rejudging.measured_trials());

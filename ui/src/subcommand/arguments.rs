@@ -112,7 +112,7 @@ pub fn load_config_for(robot: &RobotFiles, given: Option<&Path>) -> Result<Confi
 }
 
 /// Returns the given configuration, else the user's own, if there is one; reports that the user's own is used.
-fn given_or_user(given: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
+pub fn given_or_user(given: Option<&Path>) -> Result<Option<PathBuf>, Failure> {
     if let Some(given) = given {
         return Ok(Some(given.to_owned()));
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::{notice, put_line};
 use clap::Args;
-use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words};
+use quadfrog::engine::{EstimateChange, RejudgeError, RejudgedTrial, Rejudging, changes_in_words, config_for_recorded};
 use quadfrog::recording::session_files::recordings_of;
 use quadfrog::session::rejudge::Judgement;
 use quadfrog::trial::Verdict;
@@ -21,7 +21,8 @@ pub struct RejudgeArguments {
     /// Recordings (session.mcap) or the folder of a study; they are not changed
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Folder with the configuration to judge by, for example examples/hardware_like or a study's config; without: the defaults
+    /// Folder with the configuration to judge by, for example examples/hardware_like or a study's config [default:
+    /// ~/.config/quadfrog if it exists, else the built-in values]
     #[arg(long, value_name = "DIR")]
     config: Option<PathBuf>,
     /// Print one JSON object per trial instead of the table
@@ -30,16 +31,18 @@ pub struct RejudgeArguments {
 }
 
 pub fn run(arguments: &RejudgeArguments) -> Result<(), Failure> {
-    let config = arguments::load_config(arguments.config.as_deref())?;
+    let folder = arguments::given_or_user(arguments.config.as_deref())?;
     let mut files = Vec::new();
     for path in &arguments.files {
         files.extend(recordings_of(path)?);
     }
     let written: Vec<PathBuf> = files.iter().filter(|file| is_written(file)).cloned().collect();
-    let mut rejudging = Rejudging::open(&files, &config).map_err(|error| match error {
+    let refuse = |error| match error {
         RejudgeError::Recording(error) => error.into(),
         error => Failure::input(error),
-    })?;
+    };
+    let config = config_for_recorded(&files, folder.as_deref()).map_err(refuse)?;
+    let mut rejudging = Rejudging::open(&files, &config).map_err(refuse)?;
     let mut results: Vec<RejudgedTrial> = Vec::new();
     for result in rejudging.by_ref() {
         // Of several runs of a trial the last one has the row.

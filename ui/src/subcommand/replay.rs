@@ -10,8 +10,7 @@ use crate::model::RobotFacts;
 use crate::{notice, put_line, terminal};
 use anyhow::anyhow;
 use clap::Args;
-use quadfrog::config::Config;
-use quadfrog::engine::{Rejudging, VerifyError, attached_config, attached_robot, running_session};
+use quadfrog::engine::{Rejudging, VerifyError, attached_config, attached_robot, config_for_recorded, running_session};
 use quadfrog::recording::RecordingError;
 use quadfrog::recording::player::{Damage, Played, Player};
 use quadfrog::recording::session_files::{recordings_in, recordings_of};
@@ -74,7 +73,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let mut recording = Timeline::open(&files)?;
     if let Some(folder) = &arguments.rejudge {
         // What cannot be judged is refused before the screen opens.
-        Rejudging::open(&files, &Config::load(Some(folder))?).map_err(Failure::input)?;
+        let config = config_for_recorded(&files, Some(folder)).map_err(Failure::input)?;
+        Rejudging::open(&files, &config).map_err(Failure::input)?;
     }
     let mut second = None;
     if let Some(path) = &arguments.beside {
