@@ -261,6 +261,26 @@ fn the_commands_at_the_end_of_a_session_begin_in_a_line_of_their_own() {
     );
 }
 
+/// Regression: a new session named the recording of another one, which had begun in the same second and was running, as one to be
+/// repaired.
+#[test]
+fn the_end_of_a_new_session_names_no_recording_of_another_one() {
+    let program = Program::new();
+    let now = jiff::Zoned::now();
+    for second in 0..60 {
+        let stamp = now.checked_add(jiff::SignedDuration::from_secs(second)).unwrap().strftime("%Y-%m-%dT%H-%M-%S");
+        program.write(&format!("recordings/{stamp}-forward-seed0/session.mcap.part"), "");
+    }
+    let mut session = Session::start(&program.path("recordings"), (120, 40), &["--seed", "0"]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("q");
+    assert!(session.wait().success());
+    let sent = String::from_utf8_lossy(&session.sent_bytes()).into_owned();
+    let shown = sent.split("The study and its recording are in").nth(1).expect("the end of the session");
+    assert_shows(shown, &["-forward-seed0-2", "make its report"]);
+    assert!(!shown.contains("repair"), "{shown}");
+}
+
 /// Regression: a path in a dialog was broken in the middle of a name.
 #[test]
 fn a_path_in_a_dialog_is_broken_behind_a_slash() {

@@ -179,9 +179,12 @@ pub fn run(arguments: &ConsoleArguments) -> Result<(), Failure> {
         }
     };
     let console = console.with_robot(RobotFacts::new(robot.clone(), &config, backend, selected.seed.into()));
-    let earlier = if arguments.resume.is_some() { recordings_in(&selected.folder) } else { Vec::new() };
+    // The folder of a new study is not made yet: another session may have its name.
+    let (earlier, incomplete) = match &arguments.resume {
+        Some(folder) => (recordings_in(folder), unfinished_in(folder)),
+        None => (Vec::new(), Vec::new()),
+    };
     let console = console.with_earlier(earlier);
-    let incomplete = unfinished_in(&selected.folder);
     let mut options = Options {
         seed: selected.seed,
         trials: arguments.study.trials.or(selected.budget),
