@@ -210,6 +210,25 @@ fn doctor_names_a_folder_that_cannot_be_written() {
     assert!(!program.path("new").exists(), "doctor changes nothing");
 }
 
+/// Regression: with a `console.toml` that the console refuses, `doctor` called the machine usable.
+#[test]
+fn doctor_refuses_the_appearance_and_keys_that_the_console_refuses() {
+    let program = Program::new();
+    program.write("mine/console.toml", "[keys]\narm = [\"F99\"]\n");
+    let message = program.refused(&["doctor", "--config", "mine"]);
+    assert_shows(&message, &["mine/console.toml:2", "`keys.arm` = F99", "is no key"]);
+}
+
+/// Regression: it has no screen, and was refused for a key of the screen.
+#[test]
+fn a_check_of_a_recording_needs_no_console_toml() {
+    let program = Program::new();
+    program.write("mine/console.toml", "[keys]\narm = [\"F99\"]\n");
+    program.text(&["optimize", "--trials", "1", "--config", "mine"]);
+    let study = program.study("recordings");
+    program.text(&["replay", "--check", study.to_str().unwrap(), "--config", "mine"]);
+}
+
 #[test]
 fn an_error_is_one_plain_line_without_colours_and_repetitions() {
     let program = Program::new();

@@ -17,6 +17,7 @@ use quadfrog::session::parallel;
 use quadfrog::trial::Backend;
 
 use super::arguments;
+use super::console::settings;
 use super::failure::Failure;
 
 /// Number of wake-ups measured, at 1 kHz.
@@ -73,6 +74,7 @@ impl fmt::Display for DoctorItem {
 
 pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     let config = arguments::load_config(arguments.config.as_deref())?;
+    settings(&config)?;
     let scheduling = config.scheduling(Backend::Hardware);
     let mut items = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
     items.extend(wake_up(scheduling));

@@ -55,8 +55,6 @@ pub struct ReplayArguments {
 }
 
 pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
-    let config = arguments::load_config(arguments.config.as_deref())?;
-    let console = options(&arguments.screen, &config)?;
     let newest = [PathBuf::from(RECORDINGS)];
     let named = if arguments.files.is_empty() { &newest[..] } else { &arguments.files };
     if arguments.files.is_empty() && !newest[0].is_dir() {
@@ -70,6 +68,8 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if arguments.check {
         return check(&files);
     }
+    let config = arguments::load_config(arguments.config.as_deref())?;
+    let console = options(&arguments.screen, &config)?;
     let mut recording = Timeline::open(&files)?;
     if let Some(folder) = &arguments.rejudge {
         // What cannot be judged is refused before the screen opens.
