@@ -185,3 +185,22 @@ fn a_signal_ends_the_study_of_a_bench_and_removes_its_folder() {
     let left: Vec<String> = names_in(Path::new("/proc")).into_iter().filter(|name| of_study(name)).collect();
     assert_shows(&format!("left: {left:?}"), &["left: []"]);
 }
+
+/// Regression: systemd called a worker that it had stopped failed, and started one whose study does not exist again every minute.
+#[test]
+fn the_service_of_a_worker_knows_its_exit_statuses() {
+    let unit =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../packaging/quadfrog-worker.service")).unwrap();
+    let value = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).unwrap_or_default();
+    assert_eq!(value("ExecStart"), "/usr/bin/quadfrog optimize --join ${QUADFROG_STUDY}");
+    let program = Program::new();
+    program.text(&["optimize", "--trials", "1", "--record", "none", "--output", "met"]);
+    program.text(&["optimize", "--join", program.study("met").to_str().unwrap()]);
+
+    let refused = program.run(&["optimize", "--join", "study"]).status.code().unwrap();
+    assert_eq!(value("RestartPreventExitStatus"), refused.to_string());
+
+    let mut ended = optimizing(&program, 1, &["--record", "none"]);
+    send(&ended.0, Signal::SIGTERM);
+    assert_eq!(value("SuccessExitStatus"), ended.0.wait().unwrap().code().unwrap().to_string());
+}
