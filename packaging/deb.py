@@ -100,4 +100,5 @@ def main():
     print(file)
 
 
-main()
+if __name__ == "__main__":
+    main()

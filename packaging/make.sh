@@ -80,7 +80,7 @@ pack() {
     fi
     cp -r "$generated/man" "$generated/completions" packaging/limits.conf packaging/quadfrog-worker.service "$folder/$name/share/"
     cp -r robots "$folder/$name/share/"
-    cp -r examples/*/ "$folder/$name/share/examples/"
+    (cd examples && cp --parents */*.toml "$folder/$name/share/examples/")
     cp README.md CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE "$folder/$name/"
     tar --sort=name --mtime="@$SOURCE_DATE_EPOCH" --owner=0 --group=0 --numeric-owner -C "$folder" -cf - "$name" |
         gzip -9 -n >"$packages/$name.tar.gz"

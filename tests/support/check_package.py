@@ -19,6 +19,8 @@ import tarfile
 import tempfile
 
 USER = 1234
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+EXAMPLES = {file.parent.name for file in ROOT.glob("examples/*/*.toml")}
 
 
 def run(*command, **options):
@@ -128,6 +130,8 @@ def check_installed(root, package):
     require("study.log" in written and "session.mcap" in written, "its journal and recording are there")
     listed = inside(root, "/usr/bin/quadfrog", "config", "check", "/usr/share/doc/quadfrog/examples/config/rough_terrain")
     require("error" not in listed, "an example configuration of the package is valid")
+    packed = {path.name for path in (root / "usr/share/doc/quadfrog/examples/config").iterdir()}
+    require(packed == EXAMPLES, f"the package has the {len(packed)} example configurations")
     program = (root / "usr/bin/quadfrog").read_bytes()
     run(*dpkg, "--purge", "quadfrog")
     left = [path for path in root.rglob("*quadfrog*") if "home" not in path.parts and path.is_file()]
@@ -154,6 +158,9 @@ def main():
         require(files.extractfile(names["quadfrog"]).read() == program, "the archive has the same program")
         for name in ["README.md", "LICENSE-MIT", "share/man/quadfrog.1.gz", "share/completions/_quadfrog", "share/robots/go1/go1.urdf"]:
             require(name in names, f"the archive has {name}")
+        files_of = [pathlib.PurePath(name) for name, whole in names.items() if files.getmember(whole).isfile()]
+        packed = {name.parts[2] for name in files_of if name.parts[:2] == ("share", "examples")}
+        require(packed == EXAMPLES, f"the archive has the {len(packed)} example configurations, and nothing else there")
 
 
 main()
