@@ -371,6 +371,17 @@ fn manual_pages_and_schemas_are_written_whole_or_not_at_all() {
     assert!(complete("man", "quadfrog-study-list.1").contains("quadfrog"));
 }
 
+/// Regression: the first measurement of an hour ran before cyclictest was looked for.
+#[test]
+fn a_bench_beside_cyclictest_looks_for_it_first() {
+    let program = Program::new();
+    let mut bench = program.command(&["bench", "loop", "--cyclictest", "--seconds", "3600"]);
+    let output = bench.env("PATH", program.path("")).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && output.stdout.is_empty(), "{message}");
+    assert_shows(&message, &["cyclictest: No such file or directory", "apt-get install rt-tests"]);
+}
+
 /// Regressions: `bench` hid the reason for which `optimize` had failed, took the figure of a script that had failed and one of 0,
 /// and a duration that is too short for a measurement.
 #[test]

@@ -116,6 +116,9 @@ impl LoopMeasurement {
 }
 
 pub fn run(arguments: &LoopArguments) -> Result<(), Failure> {
+    if arguments.cyclictest {
+        machine::require_cyclictest()?;
+    }
     machine::print_header("");
     // All measurements run on the same core: the first isolated one, if any.
     let core = isolated_cores().first().copied();

@@ -1,6 +1,7 @@
 //! The machine's share of a tick, without quadfrog's code: the wake-up latency of cyclictest and the duration of the
 //! system calls of a tick.
 
+use std::io;
 use std::net::{Ipv4Addr, UdpSocket};
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -54,7 +55,7 @@ struct LoopbackPair {
 }
 
 impl LoopbackPair {
-    fn open() -> std::io::Result<LoopbackPair> {
+    fn open() -> io::Result<LoopbackPair> {
         let bind = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0));
         let pair = LoopbackPair { controller: bind()?, robot: bind()? };
         pair.controller.connect(pair.robot.local_addr()?)?;
@@ -122,6 +123,16 @@ pub fn system_calls(
     })
 }
 
+/// Refuses a machine without cyclictest: before the first measurement, which may take hours.
+pub fn require_cyclictest() -> Result<(), Failure> {
+    output_of(Command::new("cyclictest").arg("--help")).map_err(no_cyclictest)?;
+    Ok(())
+}
+
+fn no_cyclictest(error: io::Error) -> Failure {
+    Failure::input(format!("cyclictest: {error}; install it: apt-get install rt-tests"))
+}
+
 /// Runs cyclictest once and adds its histogram, in whole microseconds, to `durations`.
 pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations) -> Result<(), Failure> {
     let mut program = Command::new("cyclictest");
@@ -133,8 +144,7 @@ pub fn cyclictest(scheduling: Scheduling, loops: u64, durations: &mut Durations)
     if let Some(core) = scheduling.core {
         program.arg(format!("--affinity={core}"));
     }
-    let output = output_of(&mut program)
-        .map_err(|error| Failure::input(format!("cyclictest: {error}; install it: apt-get install rt-tests")))?;
+    let output = output_of(&mut program).map_err(no_cyclictest)?;
     let text = String::from_utf8_lossy(&output.stdout);
     if !output.status.success() {
         let errors = String::from_utf8_lossy(&output.stderr);
