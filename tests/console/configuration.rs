@@ -175,6 +175,18 @@ fn a_new_configuration_is_valid_and_differs_in_nothing_until_it_is_edited() {
     assert_eq!(fs::read_to_string(own.join("quadfrog/console.toml")).unwrap(), "chart_window_s = 900.0\n");
 }
 
+/// Regression: the range on hardware continued the sentence of a comment without a full stop.
+#[test]
+fn the_range_on_hardware_is_a_sentence_of_its_own_in_a_schema() {
+    let schema: serde_json::Value =
+        serde_json::from_str(&Program::new().text(&["config", "schema", "safety.toml"])).unwrap();
+    let expires = schema["properties"]["approval"]["properties"]["expires_s"]["description"].as_str().unwrap();
+    assert_shows(expires, &["At most 5 on hardware. On hardware it must be 0.5 to 5 s."]);
+    let text = schema.to_string();
+    let joined = text.match_indices(" On hardware it ").filter(|(at, _)| !text[..*at].ends_with('.'));
+    assert_eq!(joined.count(), 0);
+}
+
 /// The schema takes every shipped file, and refuses what the program refuses.
 #[test]
 fn the_schemas_agree_with_the_program() {

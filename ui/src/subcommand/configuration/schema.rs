@@ -58,8 +58,13 @@ fn of_key(file: &FileReference, path: &str, key: &KeyReference) -> Option<Json> 
         schema["default"] = json!(default);
     }
     let hardware = key.hardware_range.map(|range| format!("On hardware it {}.", range.text)).unwrap_or_default();
-    let comment = [key.comment.as_str(), &hardware].iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>();
-    describe(&mut schema, &comment.join(" "));
+    // A comment of one sentence has no full stop of its own.
+    let between = match key.comment.as_str() {
+        comment if comment.is_empty() || hardware.is_empty() => "",
+        comment if comment.ends_with('.') => " ",
+        _ => ". ",
+    };
+    describe(&mut schema, &format!("{}{between}{hardware}", key.comment));
     Some(schema)
 }
 
