@@ -6,7 +6,10 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-use crate::program::{Program, assert_shows};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+use crate::program::{Program, assert_shows, ending_signals};
 
 /// Regressions: after a line that is not UTF-8 no fault was taken any more, without a word; a line without an end was kept whole, up to
 /// the end of the memory.
@@ -80,4 +83,15 @@ fn an_emulator_whose_robot_ends_is_an_error() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert_shows(&message, &["the monotonic clock"]);
+}
+
+/// A promise of `docs/commands.md`.
+#[test]
+fn a_signal_switches_the_emulated_robot_off_with_status_zero() {
+    let program = Program::new();
+    for signal in ending_signals().into_iter().filter(|signal| *signal != Signal::SIGHUP) {
+        let (_, mut emulator) = listening(&program, "127.0.0.1:0");
+        kill(Pid::from_raw(emulator.id() as i32), signal).unwrap();
+        assert_eq!(emulator.wait().unwrap().code(), Some(0), "{signal}");
+    }
 }
