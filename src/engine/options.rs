@@ -134,7 +134,7 @@ pub enum EngineError {
     NoStudyInFolder { folder: PathBuf, below: usize },
     #[error("{journal}: several studies are in it; choose one with --name: {names}")]
     WhichStudy { journal: String, names: String },
-    #[error("{journal}: there is no such study in it{}", if names.is_empty() { String::new() } else { format!("; its studies: {names}") })]
+    #[error("{journal}: {}", no_such_study(names))]
     NoSuchStudy { journal: String, names: String },
     #[error("{journal}: study {name} cannot be used: {reason}")]
     Unusable { journal: String, name: String, reason: String },
@@ -162,6 +162,14 @@ pub enum EngineError {
     NoPrior,
     #[error("{what}: {source}")]
     System { what: String, source: std::io::Error },
+}
+
+/// Returns the other studies of a journal, or the remedy where there is none.
+fn no_such_study(names: &str) -> String {
+    match names {
+        "" => "there is no study in it; give the folder of a study, as `quadfrog study list` names it".to_owned(),
+        names => format!("there is no such study in it; its studies: {names}"),
+    }
 }
 
 /// Returns the way to a study from a folder that holds none itself; `below` counts those in its folders.

@@ -43,6 +43,20 @@ fn a_folder_without_permission_is_not_called_empty() {
     closed(0o755);
 }
 
+/// Regression: of a file without a study, or one that is no journal, "no such study" was reported where none was named, without a remedy.
+#[test]
+fn a_journal_without_a_study_is_refused_with_the_remedy() {
+    let program = Program::new();
+    program.write("empty/study.log", "");
+    program.write("notes.txt", "a line\n");
+    for command in [&["study", "show"][..], &["study", "best"], &["study", "export"], &["report"]] {
+        for place in ["empty", "notes.txt"] {
+            let message = program.refused(&[command, &[place]].concat());
+            assert_shows(&message, &[place, "there is no study in it", "quadfrog study list"]);
+        }
+    }
+}
+
 /// Regression: a table of a user's own became readable for all.
 #[test]
 fn a_replaced_file_keeps_its_permissions() {
