@@ -39,7 +39,7 @@ const CONSOLE: [&[&str]; 12] = [
     &["legal"],
     &["arming", "details", "help"],
     &["update", "view", "feed", "export", "terminal", "input"],
-    &["picture"],
+    &["picture", "leaving"],
     &["app", "screenshot"],
     &["subcommand"],
 ];

@@ -406,6 +406,17 @@ impl EngineHandle {
         self.records.try_recv().ok()
     }
 
+    /// Takes no further request, whereupon the session begins to end: a standing robot sits down. To be followed by
+    /// [`EngineHandle::shutdown`].
+    pub fn end_requests(&mut self) {
+        self.requests = None;
+    }
+
+    /// Whether the session has ended after [`EngineHandle::end_requests`].
+    pub fn session_has_ended(&self) -> bool {
+        self.session.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// Sits the robot down if it stands, closes the recording and ends the threads. Returns the records of the end.
     pub fn shutdown(mut self) -> Vec<Stamped> {
         self.end();
@@ -413,7 +424,7 @@ impl EngineHandle {
     }
 
     fn end(&mut self) {
-        self.requests = None;
+        self.end_requests();
         // Each thread ends after the one that feeds it: the session, then control, then the recorder. A panic was reported
         // when it happened.
         let session = self.session.take().map(JoinHandle::join);

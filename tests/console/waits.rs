@@ -61,6 +61,29 @@ fn a_console_that_waits_for_a_lock_says_so_before_its_screen() {
     assert!(session.wait().success() && session.restored());
 }
 
+/// Regression: from the quit key to the end of the session, here that of the lock, the screen stood still: READY, with the key of the
+/// next jump.
+#[test]
+fn a_session_that_ends_shows_the_mode_and_what_it_waits_for() {
+    let program = Program::new();
+    let mut session = Session::start(&program.path("recordings"), (120, 36), &[]);
+    session.wait_for(&["Press A to arm"]);
+    session.send("A");
+    session.wait_for(&["READY"]);
+    session.approve();
+    session.wait_for(&["Trial #0: judge it"]);
+    // Stored at the end: until then it can be undone.
+    session.send("a");
+    session.wait_for(&["u takes it back"]);
+    let lock = lock(&program.study("recordings"));
+    session.send("q");
+    session.wait_for(&["Press y to quit"]);
+    session.send("y");
+    session.wait_for(&["DISARMED", "Quitting: waiting for the study's lock"]);
+    fs::remove_file(lock).unwrap();
+    assert!(session.wait().success() && session.restored());
+}
+
 #[test]
 fn a_command_that_waits_for_a_lock_says_so_and_goes_on_at_its_end() {
     let program = Program::new();

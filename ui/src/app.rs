@@ -1,8 +1,6 @@
 //! The event loop: input, feed, update, draw, in this order, so that neither a slow link nor a busy engine delays the
 //! response to a key. The loop waits for neither terminal nor engine; it waits for the disk when a table is exported.
 
-use std::io;
-use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
@@ -18,7 +16,7 @@ use quadfrog::trial::counted;
 use ratatui::Frame;
 use ratatui::widgets::Clear;
 use tokio::signal::unix::{SignalKind, signal};
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::action::Action;
@@ -27,7 +25,8 @@ use crate::connection::{ConnectionMonitor, TerminalLocation};
 use crate::feed::{Feed, read_best_jump};
 use crate::foreground::{NO_SHELL, has_shell, in_foreground};
 use crate::graphics::GraphicsSupport;
-use crate::input::{KeyReader, NumberedEvent, SpaceBarIsText, TerminalEvent, read_terminal};
+use crate::input::{KeyReader, NumberedEvent, ReadEvent, SpaceBarIsText, TerminalEvent, read_in_thread};
+use crate::leaving::Leaving;
 use crate::message::{Effect, ExportedRows, Msg};
 use crate::model::{Model, RobotFacts};
 use crate::picture::PictureSchedule;
@@ -109,9 +108,6 @@ pub enum ConsoleExit {
     /// The terminal hung up; nothing can be printed.
     HungUp,
 }
-
-/// Event of the terminal; none when it hung up.
-type ReadEvent = Option<NumberedEvent>;
 
 /// Opens the console on the feed and runs it until the operator or the system ends it; then ends the session of a live feed.
 ///
@@ -207,7 +203,7 @@ impl Console {
     async fn run(mut self) -> anyhow::Result<ConsoleExit> {
         let (input, mut inputs) = unbounded_channel();
         let stop = self.feed.stop_latch();
-        read_input(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
+        read_in_thread(input.clone(), KeyReader::new(stop.is_none(), stop, self.space_bar_is_text.clone()))?;
         terminal::watch_for_hang_up(move || drop(input.send(None))).context("hang-up watcher")?;
         let mut interrupted = signal(SignalKind::interrupt())?;
         let mut terminated = signal(SignalKind::terminate())?;
@@ -443,38 +439,36 @@ impl Console {
         Ok(())
     }
 
-    /// Ends the session, or leaves a watched one. Sitting down takes seconds, an unconfirmed STOP at most one: the screen stays, and
-    /// STOP keeps working.
+    /// Ends the session, or leaves a watched one. Sitting down takes seconds, a lock of the study half a minute, an unconfirmed STOP at
+    /// most one second: the screen goes on until the session has ended, and STOP keeps working.
     fn end_session(mut self, inputs: &mut UnboundedReceiver<ReadEvent>) -> anyhow::Result<ConsoleExit> {
         let ended = self.ended.unwrap_or(ConsoleExit::Quit);
         // The operator is present after a quit key, but not after a hang-up or SIGTERM.
         let heartbeat = self.feed.handle().map(EngineHandle::heartbeat).filter(|_| ended == ConsoleExit::Quit);
-        let stop = self.feed.stop_latch();
+        let mut leaving = Leaving { heartbeat, stop: self.feed.stop_latch(), inputs };
         let jumps = matches!(self.model.mode(), Mode::Jump | Mode::Settle);
         if self.model.robot_is_energised() && (jumps || self.model.session.info.is_hardware()) {
             let first = if jumps { "lands" } else { "sits down" };
             say(&mut self.model, LogLevel::Info, format!("quitting: the robot {first}, then the program ends"));
         }
+        self.update_with([Msg::Leaving]);
         self.redraw = true;
         self.screen.wait_until_written();
         self.draw_if_due()?;
-        self.space_bar_is_text.report(self.keys, false);
+        self.feed.end_requests();
+        while !self.feed.session_has_ended() {
+            leaving.pause(&self.connection);
+            if !self.screen.broken() {
+                self.hold_terminal();
+            }
+            self.poll_feed();
+            // A terminal that cannot be drawn on shortens no sitting down.
+            let _ = self.draw_if_due();
+        }
         let (feed, connection) = (self.feed, self.connection);
         let closing = std::thread::Builder::new().name("close".into()).spawn(move || feed.shutdown())?;
         while !closing.is_finished() {
-            if let Some(heartbeat) = &heartbeat
-                && connection.alive()
-            {
-                heartbeat.beat();
-            }
-            while let Ok(input) = inputs.try_recv() {
-                if let (Some(NumberedEvent { event: TerminalEvent::Key(key), .. }), Some(stop)) = (input, &stop)
-                    && key.stops()
-                {
-                    stop.set();
-                }
-            }
-            std::thread::sleep(PULSE / 5);
+            leaving.pause(&connection);
         }
         // A panic of the closing thread is among those of all threads.
         let _ = closing.join();
@@ -486,15 +480,4 @@ impl Console {
 fn panic_error(thread: &str) -> anyhow::Error {
     terminal::wait_for_report();
     anyhow!("the thread `{thread}` panicked; the robot was stopped and the session was ended")
-}
-
-/// Reads the terminal in a thread, which sets the STOP latch by itself, even if the loop hangs.
-fn read_input(inputs: UnboundedSender<ReadEvent>, reader: KeyReader) -> io::Result<()> {
-    let terminal = io::stdin().as_fd().try_clone_to_owned()?;
-    let read = move || {
-        // Either way the terminal cannot be read any more.
-        let _ = read_terminal(&terminal, reader, |input| inputs.send(Some(input)).is_ok());
-        let _ = inputs.send(None);
-    };
-    std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
 }

@@ -27,6 +27,7 @@ mod help;
 pub mod input;
 pub mod keymap;
 mod layout;
+mod leaving;
 mod legal;
 pub mod message;
 pub mod model;

@@ -64,6 +64,8 @@ pub enum Msg {
     Suspend,
     /// The process continues after a stop: the arming checks are out of date.
     Resumed,
+    /// The console ends the session: keys other than STOP have no effect any more.
+    Leaving,
 }
 
 /// Mouse input; columns and rows count from 0 at the upper left.

@@ -118,6 +118,18 @@ impl Feed {
         messages
     }
 
+    /// Takes no further request, whereupon the session begins to end: a standing robot sits down.
+    pub fn end_requests(&mut self) {
+        if let Feed::Live(handle) = self {
+            handle.end_requests();
+        }
+    }
+
+    /// Whether the session has ended after [`Feed::end_requests`]; of a recording there is none.
+    pub fn session_has_ended(&self) -> bool {
+        self.handle().is_none_or(EngineHandle::session_has_ended)
+    }
+
     /// Ends the session: sits the robot down and closes the files. An observer of a session leaves it once its STOP is confirmed, or
     /// after 1 s.
     pub fn shutdown(self) {

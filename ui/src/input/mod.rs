@@ -13,6 +13,7 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::unistd::read;
 use quadfrog::realtime::channel::StopLatch;
+use tokio::sync::mpsc::UnboundedSender;
 
 pub use decoder::{Decoder, TerminalEvent};
 
@@ -118,6 +119,23 @@ impl KeyReader {
 fn edits(key: Key) -> bool {
     let moves = [KeyCode::Backspace, KeyCode::Delete, KeyCode::Left, KeyCode::Right, KeyCode::Home, KeyCode::End];
     key.typed().is_some() || moves.contains(&key.code())
+}
+
+/// Event of the terminal; none when it hung up.
+pub type ReadEvent = Option<NumberedEvent>;
+
+/// Reads the terminal in a thread, which sets the STOP latch by itself, even if the event loop hangs.
+///
+/// # Errors
+/// The system grants no descriptor or no thread.
+pub fn read_in_thread(inputs: UnboundedSender<ReadEvent>, reader: KeyReader) -> io::Result<()> {
+    let terminal = io::stdin().as_fd().try_clone_to_owned()?;
+    let read = move || {
+        // Either way the terminal cannot be read any more.
+        let _ = read_terminal(&terminal, reader, |input| inputs.send(Some(input)).is_ok());
+        let _ = inputs.send(None);
+    };
+    std::thread::Builder::new().name("keys".into()).spawn(read).map(|_| ())
 }
 
 /// Reads `terminal` until it hangs up or `forward` returns false.

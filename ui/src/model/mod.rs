@@ -172,6 +172,8 @@ pub struct Model {
     pub observers: Option<usize>,
     /// Wait of the session for the storage of its study.
     pub storage: Option<StorageWait>,
+    /// Whether the console ends the session.
+    pub leaving: bool,
     pub history: SignalHistory,
     pub health_history: HealthHistory,
     /// Whether view Health shows its history in place of the numbers.
@@ -240,6 +242,7 @@ impl Model {
             viewers: None,
             observers: None,
             storage: None,
+            leaving: false,
             history: SignalHistory::default(),
             health_history: HealthHistory::default(),
             health_history_shown: false,

@@ -127,6 +127,11 @@ fn fold(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.log_view.back = 0;
         }
         Msg::Resumed => model.session.arming_checks.clear(),
+        Msg::Leaving => {
+            // In an open field Space would type.
+            model.dialog = None;
+            model.leaving = true;
+        }
     }
     Vec::new()
 }

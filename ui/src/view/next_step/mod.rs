@@ -75,6 +75,7 @@ fn without_row(model: &Model) -> NextStep {
         None if model.session.info.observe && legal(Action::Acknowledge, model).is_err() => {
             step("Observing: of the keys STOP alone reaches the robot.", model, &[QUIT])
         }
+        None if model.leaving => leaving(model),
         None => live(model),
     }
 }
@@ -91,6 +92,18 @@ fn step(lead: impl Into<String>, model: &Model, others: &[(Action, &'static str)
         })
         .collect();
     NextStep { lead: lead.into(), short: String::new(), others }
+}
+
+/// The rest of a session that ends, in which no key but STOP has an effect.
+fn leaving(model: &Model) -> NextStep {
+    let lead = match (model.mode(), model.storage) {
+        (Mode::Jump | Mode::Settle, _) => "Quitting: the robot lands.".to_owned(),
+        (mode, _) if mode.energised() => "Quitting: the robot sits down.".to_owned(),
+        (_, Some(wait)) => format!("Quitting: waiting for {}, {:.0} s.", wait.place(), wait.waited.as_secs_f64()),
+        (mode, None) if mode.commanded() => "Quitting: the motors are damped.".to_owned(),
+        (_, None) => "Quitting.".to_owned(),
+    };
+    step(lead, model, &[])
 }
 
 fn live(model: &Model) -> NextStep {
