@@ -1,5 +1,6 @@
 //! Faults, falls, warnings and trial inhibits: quantity, measured value and limit. A joint is an index, 0..12.
 
+use nix::errno::Errno;
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::robot::joint_name;
@@ -65,7 +66,7 @@ pub enum Fault {
     OperatorLost { silent_ms: u32 },
     #[error("the session ended: the program was quit or its terminal was lost")]
     OperatorLeft,
-    #[error("the command could not be sent (error {errno})")]
+    #[error("{}", not_sent(*.errno))]
     Send { errno: i32 },
     /// The ring of events is full or abandoned.
     #[error("the session does not take events")]
@@ -206,6 +207,11 @@ impl Fault {
                 | Fault::Suspended { .. }
         )
     }
+}
+
+fn not_sent(errno: i32) -> String {
+    let cause = Errno::from_raw(errno).desc();
+    format!("the command could not be sent: {cause} (error {errno}); check the cable and this computer's network")
 }
 
 fn guard_silent(silent_ms: u32, allowed_ms: u32) -> String {

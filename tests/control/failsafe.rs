@@ -77,7 +77,7 @@ fn every_cut_row_damps_within_two_ticks_and_names_its_fault() {
         (|b| b.robot.tamper = |s| s.motor_temperature_c[9] = 80.0, "RL_hip at 80 degrees Celsius, limit 80"),
         (|b| b.robot.link.recent_corrupt = 11, "11 states with a wrong checksum within 5 s, limit 10"),
         (|b| b.robot.tamper = |s| s.robot_time_ms = 5, "its clock went backwards"),
-        (|b| b.robot.send_errno = Some(111), "could not be sent (error 111)"),
+        (|b| b.robot.send_errno = Some(111), "could not be sent: Connection refused (error 111); check the cable"),
         (|b| b.inputs.lateness_ns = 10_100_000, "control thread late: 10.1 ms exceeds 10.0 ms"),
         (|b| b.inputs.events_lost = true, "the session does not take events"),
         (|b| b.robot.tamper = |s| tilt(s, Vector3::x_axis(), 0.36), "tilt 0.360 rad exceeds 0.350 rad"),
