@@ -243,6 +243,15 @@ fn the_doctor_reports_each_item_and_a_remedy_for_each_warning() {
     assert_eq!(printed.lines().filter(|line| line.trim_start().starts_with("-> ")).count(), warnings, "{printed}");
 }
 
+/// Regression: the latency was compared with 500 us at the 99th percentile, whatever the configuration asks for at arming.
+#[test]
+fn the_doctor_compares_the_latency_with_the_limits_of_its_configuration() {
+    let program = Program::new();
+    assert_shows(&program.text(&["doctor"]), &[" % later than 0.5 ms, limit 1.0 %"]);
+    program.write("lax/safety.toml", "[pre_arm]\nlate_ms = 2.0\nlate_share = 0.05\n");
+    assert_shows(&program.text(&["doctor", "--config", "lax"]), &[" % later than 2 ms, limit 5.0 %"]);
+}
+
 #[test]
 fn without_a_terminal_the_console_names_the_alternatives() {
     let program = Program::new();

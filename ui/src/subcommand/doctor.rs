@@ -10,6 +10,7 @@ use crate::connection::TerminalLocation;
 use crate::put_line;
 use anyhow::anyhow;
 use clap::Args;
+use quadfrog::control::settings::ArmingLimits;
 use quadfrog::realtime::scheduling::{ALLOW_LOCKING, ALLOW_PRIORITY, Scheduling};
 use quadfrog::realtime::{system, thread};
 use quadfrog::recording::disk;
@@ -77,7 +78,7 @@ pub fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     settings(&config)?;
     let scheduling = config.scheduling(Backend::Hardware);
     let mut items = vec![kernel(), priority(scheduling), memory(), cores(), governor(), timer()];
-    items.extend(wake_up(scheduling));
+    items.extend(wake_up(scheduling, &config.safety.arming));
     items.extend([characters(), colours(), size(), connection()]);
     items.push(disk_space(&arguments.output, config.safety.arming.disk_free_mb));
     items.push(folder(&arguments.output));
@@ -144,8 +145,9 @@ fn timer() -> DoctorItem {
     }
 }
 
-/// Requests the scheduling of the control thread on hardware, and measures wake-ups with what was granted.
-fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
+/// Requests the scheduling of the control thread on hardware, measures wake-ups with what was granted, and compares them with the
+/// limits of the arming check.
+fn wake_up(scheduling: Scheduling, limits: &ArmingLimits) -> Vec<DoctorItem> {
     const LATENCY: &str = "wake-up latency";
     let measured = std::thread::Builder::new().name("control".into()).spawn(move || {
         let granted = scheduling.apply();
@@ -177,9 +179,15 @@ fn wake_up(scheduling: Scheduling) -> Vec<DoctorItem> {
             }));
             let at = |rank: usize| lateness[rank.min(lateness.len() - 1)] as f64 * 1e-3;
             let (p50, p99, max) = (at(WAKE_UPS / 2), at(WAKE_UPS * 99 / 100), at(WAKE_UPS - 1));
-            let found = format!("p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us in {WAKE_UPS} wake-ups");
-            let remedy = "a robot is not armed while p99 exceeds 500 us: see the items above; end other programs";
-            items.push(DoctorItem::new(LATENCY, found, p99 < 500.0, remedy));
+            let late = lateness.iter().filter(|ns| **ns as f64 * 1e-6 > limits.late_ms).count();
+            let (late_share, late_ms) = (late as f64 / WAKE_UPS as f64, limits.late_ms);
+            let [late_percent, allowed_percent] = [late_share, limits.late_share].map(|share| 100.0 * share);
+            let found = format!(
+                "p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us in {WAKE_UPS} wake-ups; \
+                 {late_percent:.1} % later than {late_ms} ms, limit {allowed_percent:.1} %"
+            );
+            let remedy = "a robot is not armed while more are late: see the items above; end other programs";
+            items.push(DoctorItem::new(LATENCY, found, late_share <= limits.late_share, remedy));
             items
         }
         Ok(Err(error)) => {
