@@ -16,6 +16,17 @@ pub struct TickStart {
     pub lateness_ns: u64,
 }
 
+impl TickStart {
+    /// Returns the time that the loop skips after this tick, ns: whole periods, zero if it catches up with them.
+    pub const fn skipped_ns(&self, period_ns: u64) -> u64 {
+        if self.lateness_ns > FORGIVEN_PERIODS * period_ns {
+            self.lateness_ns - self.lateness_ns % period_ns
+        } else {
+            0
+        }
+    }
+}
+
 /// A loop that is more periods behind than this (the process was suspended, the machine slept) skips them instead of catching up
 /// without a pause.
 const FORGIVEN_PERIODS: u64 = 20;
@@ -106,11 +117,8 @@ pub fn pace_with_warm_up(
             return Ok(());
         }
         count += 1;
-        if lateness_ns > FORGIVEN_PERIODS * period_ns {
-            let whole_ns = lateness_ns - lateness_ns % period_ns;
-            start_ns += whole_ns;
-            skipped_ns += whole_ns;
-        }
+        start_ns += instant.skipped_ns(period_ns);
+        skipped_ns += instant.skipped_ns(period_ns);
     }
 }
 

@@ -2,12 +2,16 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
+use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use quadfrog::robot::JointCommand;
+use quadfrog::robot::go1::convert::low_cmd;
+use quadfrog::robot::go1::packet::{CrcForm, LowState};
 
 use crate::program::{Program, assert_shows, ending_signals};
 
@@ -55,6 +59,41 @@ fn an_emulator_takes_a_name_and_prints_an_address_that_can_be_driven() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert_shows(&message, &["--bind here: ", "give HOST:PORT, for example 127.0.0.1:8007"]);
+}
+
+/// Regression: the first state after a stop of the process had the robot's time of the begin of the stop, which a console reported as a
+/// clock that stood still.
+#[test]
+fn the_clock_of_an_emulated_robot_goes_on_while_its_process_is_stopped() {
+    let program = Program::new();
+    let (line, mut emulator) = listening(&program, "127.0.0.1:0");
+    let address = line.split_whitespace().last().unwrap().to_owned();
+    let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
+    robot.connect(address).unwrap();
+    robot.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+    let mut buffer = [0; 2048];
+    // The robot's time of the next state, ms, as long as one arrives.
+    let mut next_ms = || {
+        let length = robot.recv(&mut buffer).ok()?;
+        Some(LowState::parse(&buffer[..length]).unwrap().robot_time_ms.get())
+    };
+    let mut stopped_ms = None;
+    while stopped_ms.is_none() {
+        robot.send(low_cmd(&JointCommand::damping(3.0), CrcForm::Plain).unwrap().bytes()).unwrap();
+        stopped_ms = next_ms();
+    }
+    let process = Pid::from_raw(emulator.id() as i32);
+    kill(process, Signal::SIGSTOP).unwrap();
+    while let Some(later_ms) = next_ms() {
+        stopped_ms = Some(later_ms);
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    kill(process, Signal::SIGCONT).unwrap();
+    let first_ms = next_ms();
+    emulator.kill().unwrap();
+    emulator.wait().unwrap();
+    let passed_ms = first_ms.zip(stopped_ms).map(|(first_ms, stopped_ms)| first_ms - stopped_ms);
+    assert!(passed_ms >= Some(1000), "{passed_ms:?} ms after a stop of more than 1 s");
 }
 
 /// A library for the program: waits until a time fail after the first hundred, as with a system that has lost its clock.

@@ -107,8 +107,10 @@ pub fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
     let ending = Arc::new(AtomicBool::new(false));
     let flag = ending.clone();
     let robot = start_thread("robot", move || {
-        pace(Duration::from_secs_f64(CONTROL_PERIOD_S), Duration::ZERO, |start| {
-            emulator.step_at(start.planned_ns);
+        let period = Duration::from_secs_f64(CONTROL_PERIOD_S);
+        pace(period, Duration::ZERO, |start| {
+            // After a stop of this process the first state is of the present, too.
+            emulator.step_at(start.planned_ns + start.skipped_ns(period.as_nanos() as u64));
             if flag.load(Ordering::Acquire) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     })?;
