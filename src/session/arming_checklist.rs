@@ -121,9 +121,7 @@ impl ArmingChecklist {
             self.withdraw();
         }
         self.stop = match (self.stop, from, to, cause) {
-            (StopTest::Open, Mode::Offline | Mode::Observe | Mode::Disarmed, Mode::Damped, TransitionCause::Stop) => {
-                StopTest::Pressed
-            }
+            (StopTest::Open, Mode::Observe | Mode::Disarmed, Mode::Damped, TransitionCause::Stop) => StopTest::Pressed,
             (StopTest::Pressed, Mode::Damped, Mode::Disarmed, _) => StopTest::Passed,
             (StopTest::Pressed, ..) => StopTest::Open,
             (state, ..) => state,

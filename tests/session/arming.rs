@@ -810,6 +810,29 @@ fn a_connection_that_cannot_be_seen_is_confirmed_before_a_real_robot_is_armed() 
     assert!(answer.accepted, "{answer:?}");
 }
 
+/// Regression: by the document a STOP in OFFLINE was the test of STOP. Without a state the robot is in FAULT 20 ms later: the screen does
+/// not show that STOP has acted.
+#[test]
+fn a_stop_of_a_robot_that_has_not_answered_tests_nothing() {
+    for silent_ms in [5, 100] {
+        let mut session = Session::begin(Backend::Hardware, None, false);
+        session.robot.silent_ms = 1;
+        session.ticks(silent_ms);
+        session.operator.stop.set();
+        session.ticks(5);
+        let expected = if silent_ms == 5 { Mode::Damped } else { Mode::Fault };
+        assert_eq!(session.body.mode(), expected, "after {silent_ms} ms without a state");
+        session.robot.silent_ms = 0;
+        session.ticks(5);
+        assert!(session.request(OperatorRequest::Acknowledge).accepted);
+        session.ticks(1500);
+        assert_eq!(session.body.mode(), Mode::Disarmed);
+        assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Waiting, "{silent_ms} ms");
+        session.test_stop();
+        assert_eq!(session.state(ArmingCheck::StopTested), ArmingCheckState::Passed);
+    }
+}
+
 /// Regressions: a STOP in DAMPED or FAULT left no line in the log, and the arming check that it does not meet did not say so.
 #[test]
 fn a_stop_of_a_damped_robot_is_logged_and_tests_nothing() {
