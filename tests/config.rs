@@ -1,6 +1,7 @@
 //! Configuration files: errors are reported with file, line, key, value and remedy.
 
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::PathBuf;
 
 use quadfrog::config::{Config, ConfigLayer};
@@ -279,6 +280,20 @@ fn consistency_limits_have_ranges_and_the_remote_its_buttons() {
 #[test]
 fn a_misspelt_file_name_is_refused() {
     refuses("saftey.toml", "", &["safety.toml"]);
+    // Regression: the file was ignored without a word.
+    refuses("safety.TOML", "", &["safety.toml"]);
+}
+
+/// Regression: the defaults were in force without a word in place of limits whose link led to no file.
+#[test]
+fn a_file_that_is_a_link_to_no_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("optimize.toml"), "trials = 5\n").unwrap();
+    symlink("../shared/safety.toml", folder.path().join("safety.toml")).unwrap();
+    let error = Config::load(Some(folder.path())).expect_err("should be refused").to_string();
+    for part in ["safety.toml", "../shared/safety.toml, which does not exist", "correct or remove the link"] {
+        assert!(error.contains(part), "{part} is not in: {error}");
+    }
 }
 
 #[test]

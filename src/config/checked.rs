@@ -1,7 +1,7 @@
 //! The configuration in force: its files loaded and checked, and the settings of each part drawn from them.
 
 use std::collections::HashMap;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -83,11 +83,8 @@ impl Config {
             refuse_unknown_files(folder)?;
             for (name, _) in FILES {
                 let path = folder.join(name);
-                let unread = |source| ConfigError::Read { path: path.clone(), source };
-                if path.try_exists().map_err(unread)? {
-                    let text = read_text(&path).map_err(unread)?;
-                    texts.push((name.to_owned(), path.display().to_string(), text));
-                }
+                let text = read_given(&path).map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+                texts.extend(text.map(|text| (name.to_owned(), path.display().to_string(), text)));
             }
             if texts.len() == below {
                 return Err(ConfigError::NoFile {
@@ -426,6 +423,23 @@ fn without_type_names(message: &str, range: Option<&NumberRange>) -> String {
     format!("{found}expected {kind}")
 }
 
+/// Reads a file of a configuration folder; none where the folder has no entry of this name.
+///
+/// # Errors
+/// As of [`read_text`]; a symbolic link to no file is one: its keys, limits among them, were meant to be in force.
+fn read_given(path: &Path) -> io::Result<Option<String>> {
+    match (path.symlink_metadata(), path.metadata()) {
+        (Err(error), _) if error.kind() == ErrorKind::NotFound => Ok(None),
+        (Ok(_), Err(error)) if error.kind() == ErrorKind::NotFound => {
+            let target = path.read_link()?;
+            let reason =
+                format!("it is a link to {}, which does not exist; correct or remove the link", target.display());
+            Err(io::Error::new(error.kind(), reason))
+        }
+        _ => read_text(path).map(Some),
+    }
+}
+
 /// Rejects a folder that does not exist, and TOML files that are not read: probably a misspelt name.
 fn refuse_unknown_files(folder: &Path) -> Result<(), ConfigError> {
     let entries = match std::fs::read_dir(folder) {
@@ -438,7 +452,7 @@ fn refuse_unknown_files(folder: &Path) -> Result<(), ConfigError> {
     for entry in entries {
         let path = entry.map_err(|source| ConfigError::Read { path: folder.to_owned(), source })?.path();
         let known = path.file_name().is_some_and(|name| FILES.iter().any(|(file, _)| name == *file));
-        if path.extension().is_some_and(|extension| extension == "toml") && !known {
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) && !known {
             let known = FILES.map(|(file, _)| file).join(", ");
             return Err(ConfigError::UnknownFile { path, known });
         }
