@@ -29,12 +29,13 @@ pub struct TrialPoints {
 }
 
 impl TrialPoints {
-    /// Reads the trials. The unit cube is that of `parameters`; a point may lie outside.
+    /// Reads the trials. The unit cube is that of `parameters`; a point may lie outside. A trial of another program with a parameter
+    /// that is infinite or no number is left out.
     pub fn of(trials: &[Trial], parameters: &[Parameter], direction: Direction) -> TrialPoints {
         let mut points = TrialPoints::default();
         for trial in trials {
-            let coordinates = parameters.iter().map(|p| trial.parameter(&p.name).map(|v| p.range.scale(v)));
-            let Some(point) = coordinates.collect::<Option<Vec<f64>>>() else { continue };
+            let scaled = |p: &Parameter| trial.parameter(&p.name).map(|v| p.range.scale(v)).filter(|x| x.is_finite());
+            let Some(point) = parameters.iter().map(scaled).collect::<Option<Vec<f64>>>() else { continue };
             match (trial.state, trial.value) {
                 (TrialState::Running, _) => points.pending.push(point),
                 (TrialState::Fail, _) => points.void.push(point),

@@ -115,13 +115,15 @@ impl TpeModel {
     }
 }
 
-/// Search coordinates, by parameter, of the trials that have every parameter.
+/// Search coordinates, by parameter, of the trials that have every parameter. One without a finite coordinate, of another program, is no
+/// observation: a kernel there has no density.
 fn observations(trials: &[&Trial], parameters: &[Parameter], announced: bool) -> Vec<Vec<f64>> {
     let mut columns = vec![Vec::with_capacity(trials.len()); parameters.len()];
     for trial in trials {
         let sample = if announced && trial.state == TrialState::Running { trial.announced() } else { Vec::new() };
         let value = |p: &Parameter| trial.parameter(&p.name).or_else(|| value_of(&sample, &p.name));
-        let row: Option<Vec<f64>> = parameters.iter().map(|p| Some(p.range.inner(value(p)?))).collect();
+        let inner = |p: &Parameter| value(p).map(|v| p.range.inner(v)).filter(|x| x.is_finite());
+        let row: Option<Vec<f64>> = parameters.iter().map(inner).collect();
         columns.iter_mut().zip(row.into_iter().flatten()).for_each(|(column, x)| column.push(x));
     }
     columns
@@ -157,7 +159,8 @@ pub fn propose(ask: &Ask<'_>, streams: &mut Streams) -> Candidate {
             });
             value_of(joint, name).filter(|v| range.contains(*v)).unwrap_or_else(|| {
                 let alone = TpeModel::fit(parts, std::slice::from_ref(parameter), config.multivariate);
-                alone.propose(&mut streams.model, config.candidates)[0]
+                // Of a kernel far beyond the bounds the rounding reaches beyond them, too.
+                alone.propose(&mut streams.model, config.candidates)[0].max(range.low).min(range.high)
             })
         };
         values.push(value);

@@ -38,14 +38,12 @@ fn cdf_by_erfc(x: f64) -> f64 {
 /// (Abramowitz and Stegun, 26.2.12).
 fn log_cdf_far_left(x: f64) -> f64 {
     let inverse_square = 1.0 / (x * x);
-    let (mut sum, mut term, mut odd) = (1.0, 1.0, 1.0);
-    loop {
+    let (mut sum, mut term, mut odd) = (1.0, 1.0_f64, 1.0);
+    // Ends for a NaN, too.
+    while term.abs() > f64::EPSILON {
         term *= -odd * inverse_square;
         sum += term;
         odd += 2.0;
-        if term.abs() <= f64::EPSILON {
-            break;
-        }
     }
     -0.5 * x * x - log(-x) - HALF_LN_TWO_PI + log(sum)
 }
@@ -106,6 +104,10 @@ fn inverse_log_cdf(y: f64) -> f64 {
         // x <- x - (ln Phi(x) - z) Phi(x) / phi(x)
         let log_phi = log_cdf(x);
         let step = (log_phi - z) * exp(log_phi + 0.5 * x * x + HALF_LN_TWO_PI);
+        // Beyond some 1e9 a step is rounding alone; the start is exact to the last digits there.
+        if !step.is_finite() {
+            break;
+        }
         x -= step;
         // Convergence is quadratic: after such a step the error is of the order of rounding.
         if step.abs() < 1e-8 * x.abs() || x == 0.0 {

@@ -1,15 +1,16 @@
 //! Properties of the samplers beyond equality with Optuna: bounds, repeatability, better results than random points.
 
 use crate::support;
-use quadfrog::optimize::ask::{Direction, SamplerConfig, SamplerKind};
+use quadfrog::optimize::ask::{Ask, Candidate, Direction, SamplerConfig, SamplerKind, Streams};
 use quadfrog::optimize::gp::falls::StandProbability;
 use quadfrog::optimize::gp::process::GaussianProcess;
 use quadfrog::optimize::gp::{ascent, log_improvement};
 use quadfrog::optimize::mt19937::Mt19937;
+use quadfrog::optimize::sampler::propose;
 use quadfrog::optimize::sobol::{MAX_DIMENSIONS, Sobol};
 use quadfrog::optimize::space::{Range, Space, SpaceError};
 use quadfrog::optimize::study::{Outcome, Study, StudyOptions};
-use quadfrog::optimize::trial::{FALL, VERDICT};
+use quadfrog::optimize::trial::{Distribution, FALL, Trial, TrialState, VERDICT};
 use support::{begin, forward_log, in_memory, options, run};
 
 fn study(kind: SamplerKind, seed: u32, direction: Direction) -> Study {
@@ -201,6 +202,37 @@ fn climbing_ends_on_the_summit_or_at_the_wall() {
     let narrow = [(-2.0, 0.5), (-2.0, 2.0)];
     let (x, _) = ascent::maximize(ascent::with_gradient(valley, &narrow, 1e-6), &[-1.2, 1.0], &narrow, 200);
     assert!((x[0] - 0.5).abs() < 1e-6 && (x[1] - 0.25).abs() < 1e-3, "{x:?}");
+}
+
+/// Regression: after a trial with an infinite parameter, which Optuna runs if it is queued, the next proposal of TPE took for ever, and
+/// `gp` learned nothing any more; beside one far beyond the bounds TPE proposed points beyond them.
+#[test]
+fn a_trial_of_another_program_far_beyond_the_bounds_does_not_stop_the_search() {
+    let space = forward_log();
+    let places = Sobol::new(3, &mut Mt19937::new(1));
+    for (name, far) in [("Fz", -1.0), ("f0", f64::INFINITY), ("Fx", f64::NEG_INFINITY), ("Fx", f64::NAN), ("f0", 1e8)] {
+        let trial = |number: u32| {
+            let mut trial = Trial { value: Some(f64::from(number)), ..Trial::new(number, TrialState::Complete) };
+            for (p, u) in space.parameters().iter().zip(places.point(number)) {
+                let value = if number == 19 && p.name == name { far } else { p.range.unscale(u) };
+                trial.set(&p.name, value, Distribution::Float(p.range));
+            }
+            trial
+        };
+        let trials: Vec<Trial> = (0..20).map(trial).collect();
+        for (kind, seed) in [(SamplerKind::Tpe, 0), (SamplerKind::Tpe, 1), (SamplerKind::Gp, 0)] {
+            let config = &SamplerConfig { kind, ..SamplerConfig::default() };
+            let direction = Direction::Maximize;
+            let ask = Ask { config, trials: &trials, space: &space, fixed: &[], direction, prior: None };
+            let mut streams = Streams::new(seed);
+            for _ in 0..if kind == SamplerKind::Tpe { 20 } else { 1 } {
+                let Candidate { values, expected, .. } = propose(&ask, &mut streams);
+                let inside = space.parameters().iter().zip(&values).all(|(p, value)| p.range.contains(*value));
+                assert!(inside, "{kind:?} beside {name} = {far}: {values:?}");
+                assert_eq!(expected.is_some(), kind == SamplerKind::Gp, "{name} = {far}");
+            }
+        }
+    }
 }
 
 #[test]
