@@ -49,6 +49,21 @@ fn values_of_any_size_do_not_make_the_worst_trial_the_best() {
     assert_eq!(best["value"], json!(-0.5), "{best}");
 }
 
+/// Regression: the squares of values beyond 1e154 or below 1e-162 are no numbers or 0. `gp` then learned nothing from them.
+#[test]
+fn values_of_any_scale_are_learned_from() {
+    for scale in [1e-300, 1e300] {
+        let mut served = AskTell::new(study(SamplerKind::Gp));
+        for number in 0..20 {
+            let asked = answer(&mut served, r#"{"ask":{}}"#);
+            let value = scale * asked["params"]["Fx"].as_f64().unwrap() / 150.0;
+            let predicted = asked["predicted"].as_f64().map(|predicted| (predicted - value) / scale);
+            assert!(number < 12 || predicted.unwrap().abs() < 0.05, "{asked} instead of {value}");
+            answer(&mut served, &json!({"tell": {"number": number, "value": value, "verdict": "accept"}}).to_string());
+        }
+    }
+}
+
 /// The points are those of a study that runs the same trials, two of them open at the same time.
 #[test]
 fn the_points_are_those_of_a_study_with_the_same_results() {

@@ -573,6 +573,21 @@ fn void_and_running_trials_are_not_proposed_again() {
     assert!(distance(&unit(&study, running), &unit(&study, beside)) > 0.02);
 }
 
+/// Regression: after values whose squares are no numbers the same point was proposed again and again.
+#[test]
+fn values_beyond_every_likelihood_leave_the_proposals_to_gp() {
+    let mut study = right(1);
+    for _ in 0..12 {
+        let draft = study.draft();
+        let is_number = |expected: Expectation| expected.value.is_finite() && expected.p_stand.is_finite();
+        assert!(draft.expected.is_none_or(is_number), "{draft:?}");
+        let number = study.begin(&draft, &[], &[]).unwrap();
+        finish(&mut study, number, Some(if number.is_multiple_of(2) { 1e308 } else { -1e308 }));
+    }
+    let points = points(&study);
+    assert!((1..points.len()).all(|i| !points[..i].contains(&points[i])), "{points:?}");
+}
+
 #[test]
 fn a_prior_of_other_parameters_leaves_the_proposals_to_gp() {
     let other = |name: &str, log| {

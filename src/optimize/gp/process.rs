@@ -4,7 +4,7 @@
 use super::regression::{
     HyperPrior, Hyperparameters, LinearPrior, LogNormal, Observations, Regression, log_likelihood,
 };
-use libm::{log, sqrt};
+use libm::{exp2, floor, log, log2, sqrt};
 use nalgebra::DVector;
 
 /// A Gaussian process conditioned on observed values.
@@ -20,17 +20,17 @@ impl GaussianProcess {
     /// `None` if there are no points or the covariance cannot be factored.
     pub fn fit(points: Vec<Vec<f64>>, values: &[f64]) -> Option<Self> {
         let d = points.first()?.len();
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n;
-        let deviation = if variance > 0.0 { sqrt(variance) } else { 1.0 };
+        let unit = unit_of(values);
+        let values: Vec<f64> = values.iter().map(|v| v / unit).collect();
+        let (mean, variance) = mean_and_variance(&values);
+        let deviation = if variance > 0.0 { sqrt(variance) } else { 1.0 / unit };
         let y = DVector::from_iterator(values.len(), values.iter().map(|v| (v - mean) / deviation));
         let likelihood = |theta: &[f64]| log_likelihood(theta, &points, &y, None);
         let (hyper, _) = hyper_prior().maximize(d, 60, likelihood)?;
         let terms = vec![Vec::new(); points.len()];
         let observed = Observations { points, terms, values: y.iter().copied().collect() };
         let regression = Regression::condition(observed, LinearPrior::default(), hyper)?;
-        Some(GaussianProcess { regression, mean, deviation })
+        Some(GaussianProcess { regression, mean: mean * unit, deviation: deviation * unit })
     }
 
     /// Conditions on the expected value at each pending point; see [`Regression::believing`].
@@ -54,6 +54,21 @@ impl GaussianProcess {
     pub fn points(&self) -> &[Vec<f64>] {
         self.regression.points()
     }
+}
+
+/// A power of two as the unit of values whose variance leaves the range of a double: their largest magnitude; else 1.
+fn unit_of(values: &[f64]) -> f64 {
+    if mean_and_variance(values).1.is_normal() {
+        return 1.0;
+    }
+    let largest = values.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    if largest.is_normal() { exp2(floor(log2(largest))) } else { 1.0 }
+}
+
+fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n)
 }
 
 fn hyper_prior() -> HyperPrior {

@@ -26,10 +26,15 @@ pub struct CheckedValue {
     pub log_bayes_factor: f64,
 }
 
-/// Chooses between `about`, the model about the simulated robots, and one without them. `None` if a covariance cannot be factored.
+/// Chooses between `about`, the model about the simulated robots, and one without them. `None` if a covariance cannot be factored, or the
+/// values are so large that a likelihood is no number.
 pub fn check(about: ValueModel, ensemble: &Ensemble, history: &History) -> Option<CheckedValue> {
     let without = ValueModel::without_prior(ensemble, history)?;
     let log_bayes_factor = about.log_posterior - without.log_posterior;
     let trusted = log_bayes_factor >= -LEFT;
-    Some(CheckedValue { value: if trusted { about } else { without }, trusted, log_bayes_factor })
+    log_bayes_factor.is_finite().then_some(CheckedValue {
+        value: if trusted { about } else { without },
+        trusted,
+        log_bayes_factor,
+    })
 }
