@@ -11,6 +11,7 @@
 //!
 //! Every line of input has one line of output. Several points may be open before the first result is reported.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, Read as _};
 
 use serde::{Deserialize, Serialize};
@@ -88,7 +89,9 @@ impl AskTell {
 
     /// Answers one line, without its end. An error is an answer too: the study is unchanged then.
     pub fn answer(&mut self, line: &[u8]) -> String {
-        let answer = match serde_json::from_slice(line) {
+        // A structure could be read from a list as well.
+        let is_object = serde_json::from_slice::<BTreeMap<String, BTreeMap<String, Value>>>(line).map(drop);
+        let answer = match is_object.and_then(|()| serde_json::from_slice(line)) {
             Ok(AskTellMessage::Ask(AskMessage {})) => self.ask().map_err(|error| error.to_string()),
             Ok(AskTellMessage::Tell(tell)) => self.tell(&tell),
             Ok(AskTellMessage::Best(BestMessage {})) => self.best(),
@@ -114,7 +117,7 @@ impl AskTell {
                 answered(&json!({ "error": reason }).to_string());
                 continue;
             }
-            answered(&self.answer(&line));
+            answered(&self.answer(line.trim_ascii_end()));
         }
     }
 

@@ -156,6 +156,19 @@ fn falls_and_voids_are_told_and_errors_change_nothing() {
 }
 
 /// Regression: the result of a queued point, for which nobody had asked, was refused with "told before".
+/// Regression: values without their keys were taken by their order.
+#[test]
+fn a_list_in_place_of_an_object_is_refused() {
+    let mut served = AskTell::new(study(SamplerKind::Random));
+    answer(&mut served, r#"{"ask":{}}"#);
+    for line in [r#"{"ask":[]}"#, r#"{"best":[]}"#, r#"{"tell":[0,0.5,"accept"]}"#, r#"{"tell":[0,null,"fall"]}"#] {
+        let error = error(&mut served, line);
+        assert!(error.contains("a map") && error.contains(r#"give {"ask":{}}"#), "{line}: {error}");
+    }
+    assert_eq!(answer(&mut served, r#"{"ask":{}}"#)["number"], json!(1));
+    assert_eq!(answer(&mut served, r#"{"tell":{"number":0,"verdict":"fall"}}"#)["told"], json!(0));
+}
+
 #[test]
 fn a_result_of_a_queued_point_asks_for_the_point_first() {
     let mut queued = study(SamplerKind::Gp);
