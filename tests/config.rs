@@ -370,8 +370,21 @@ fn values_that_no_kind_can_hold_are_refused_with_their_line_key_and_value() {
     ] {
         refuses("simulator.toml", keys, &[":2", expected]);
     }
-    refuses("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n", &[":3", "tasks.forward.stance_m", "0.14"]);
+    let three = "`tasks.forward.stance_m` must be a list of 3 numbers, not a list [0.0, 0.14]";
+    refuses("control.toml", "\n[tasks.forward]\nstance_m = [0.0, 0.14]\n", &[":3", three]);
     refuses("optimize.toml", "[sampler]\nkind = \"cma\"\n", &[":2", "sampler.kind", "cma"]);
+}
+
+/// Regression: such a number was called a text in quotes, and a list that is too long was refused in a library's words.
+#[test]
+fn a_number_beyond_64_bits_and_a_list_of_another_length_are_refused_as_such() {
+    let (number, digits) = ("must be a whole number, not a number 1", "1".repeat(20));
+    refuses("optimize.toml", &format!("trials = {digits}\n"), &["optimize.toml:1", "`trials`", number]);
+    refuses("optimize.toml", &format!("[fall_price]\nforward = {digits}\n"), &[":2", "must be 0 to 10"]);
+    for bounds in ["[]", "[1.0]", "[1.0, 1.2, 1.3]"] {
+        let expected = format!("`bounds.f0` must be a list of two numbers, not a list {bounds}");
+        refuses("optimize.toml", &format!("[bounds]\nf0 = {bounds}\n"), &[":2", &expected]);
+    }
 }
 
 #[test]

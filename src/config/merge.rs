@@ -135,9 +135,11 @@ pub fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
 fn plain(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::String(text.to_string()),
-        // The parser has checked the digits and resolved radix and separators.
-        DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
-            .map_or_else(|_| Value::String(number.to_string()), Value::Integer),
+        // The parser has checked the digits and resolved radix and separators. One beyond 64 bits is a number nevertheless.
+        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+            Ok(number) => Value::Integer(number),
+            Err(_) => Value::Float(number.as_str().parse().unwrap_or(f64::INFINITY)),
+        },
         DeValue::Float(number) => {
             number.as_str().parse().map_or_else(|_| Value::String(number.to_string()), Value::Float)
         }
@@ -150,11 +152,12 @@ fn plain(value: &DeValue<'_>) -> Value {
     }
 }
 
-/// Whether a value may replace the default's: an integer may replace a float.
+/// Whether a value may replace the default's: an integer may replace a float. A list of numbers has as many as the default.
 fn same_kind(given: &Value, known: &Value) -> bool {
     match (given, known) {
         (Value::Integer(_), Value::Float(_)) => true,
         (Value::Array(given), Value::Array(known)) => match known.first() {
+            Some(Value::Integer(_) | Value::Float(_)) if given.len() != known.len() => false,
             Some(example) => given.iter().all(|item| same_kind(item, example)),
             None => true,
         },
@@ -173,6 +176,7 @@ fn expected(known: &Value) -> String {
     match known {
         Value::Array(list) => match (list.len(), list.first().and_then(of)) {
             (2, Some("numbers")) => "a list of two numbers".to_owned(),
+            (count, Some("numbers")) => format!("a list of {count} numbers"),
             (_, Some(entries)) => format!("a list of {entries}"),
             (_, None) => kind(known).to_owned(),
         },
