@@ -19,6 +19,7 @@ mod expectation;
 mod experiment;
 mod gains;
 mod guard_heartbeats;
+mod journal_faults;
 mod judged_by;
 mod limits;
 mod measure;

@@ -1,6 +1,6 @@
 //! One line of the journal: an operation and the identity of its writer, to and from JSON text.
 
-use super::json::{LineFields, TimeForm, number, numbers, parse_json, text, time};
+use super::json::{LineFields, TimeForm, number, numbers, parameter_names, parse_json, text, time};
 use super::operation::{AttributeKind, Operation};
 use crate::optimize::space::Range;
 use crate::optimize::trial::{Distribution, Trial, TrialState, number_of};
@@ -93,7 +93,8 @@ impl Operation {
             }
             4 => {
                 let started = fields.time("datetime_start")?;
-                let template = fields.members.contains_key("state").then(|| read_template(&fields)).transpose()?;
+                let template =
+                    fields.members.contains_key("state").then(|| read_template(&fields, line)).transpose()?;
                 Operation::CreateTrial { study: study()?, started, template: template.map(Box::new) }
             }
             5 => Operation::SetParameter {
@@ -143,8 +144,8 @@ fn template_fields(trial: &Trial, times: TimeForm) -> String {
     .concat()
 }
 
-/// Reads the contents of a new trial.
-fn read_template(fields: &LineFields<'_>) -> Result<Trial, String> {
+/// Reads the contents of a new trial from the members of `line`; the parameters in its order.
+fn read_template(fields: &LineFields<'_>, line: &str) -> Result<Trial, String> {
     let object = |key: &str| match fields.members.get(key) {
         None | Some(Value::Null) => Ok(Map::new()),
         Some(Value::Object(map)) => Ok(map.clone()),
@@ -156,11 +157,16 @@ fn read_template(fields: &LineFields<'_>) -> Result<Trial, String> {
     };
     let mut trial = Trial { state: fields.state()?, value, ..Trial::default() };
     let distributions = object("distributions")?;
-    for (name, value) in object("params")? {
-        let value = number_of(&value).ok_or_else(|| format!("parameter `{name}` is not a number"))?;
-        let distribution = distributions.get(&name).and_then(Value::as_str);
+    let parameters = object("params")?;
+    let order = parameter_names(line);
+    let place = |name: &String| order.iter().position(|ordered| ordered == name);
+    let mut parameters: Vec<(&String, &Value)> = parameters.iter().collect();
+    parameters.sort_by_key(|(name, _)| place(name));
+    for (name, value) in parameters {
+        let value = number_of(value).ok_or_else(|| format!("parameter `{name}` is not a number"))?;
+        let distribution = distributions.get(name).and_then(Value::as_str);
         let distribution = distribution.ok_or_else(|| format!("parameter `{name}` has no distribution"))?;
-        trial.set(&name, value, parse_distribution(distribution)?);
+        trial.set(name, value, parse_distribution(distribution)?);
     }
     for (step, value) in object("intermediate_values")? {
         let step = step.parse().map_err(|_| format!("step `{step}` is not an integer"))?;

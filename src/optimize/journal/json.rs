@@ -3,6 +3,8 @@
 use crate::optimize::trial::{TrialState, number_of};
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use serde::de::{IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 use std::cell::Cell;
 use std::fmt::Write as _;
@@ -137,6 +139,42 @@ pub fn parse_json(text: &str) -> Result<Value, String> {
     serde_json::from_str(text)
         .or_else(|strict| serde_json::from_str(&strictly(text)).map_err(|_| strict))
         .map_err(|e| format!("not JSON: {e}"))
+}
+
+/// Names of the parameters of a new trial's contents in the order of the line, which a parsed [`Value`] does not keep; none where the
+/// line repeats a member.
+pub fn parameter_names(line: &str) -> Vec<String> {
+    let contents: Result<NewTrial, _> = serde_json::from_str(line).or_else(|_| serde_json::from_str(&strictly(line)));
+    contents.ok().and_then(|contents| contents.params).map_or_else(Vec::new, |names| names.0)
+}
+
+#[derive(Deserialize)]
+struct NewTrial {
+    params: Option<NamesInOrder>,
+}
+
+struct NamesInOrder(Vec<String>);
+
+impl<'de> Deserialize<'de> for NamesInOrder {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<NamesInOrder, D::Error> {
+        struct Names;
+        impl<'de> Visitor<'de> for Names {
+            type Value = NamesInOrder;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("parameters by name")
+            }
+
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<NamesInOrder, M::Error> {
+                let mut names = Vec::new();
+                while let Some((name, IgnoredAny)) = map.next_entry()? {
+                    names.push(name);
+                }
+                Ok(NamesInOrder(names))
+            }
+        }
+        deserializer.deserialize_map(Names)
+    }
 }
 
 /// Whether a line is no JSON, as one that was cut off. Lines that only this program's parser refuses are JSON: those nested deeper than

@@ -190,27 +190,40 @@ impl Study {
             }
             id = draft.waiting.unwrap_or(journal.next_trial_id());
             let (waiting, now) = (journal.trial(id), Some(Timestamp::now()));
+            let mut system = announcement(&draft.joint);
+            system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
+            let fixed = (!given.is_empty()).then(|| (FIXED_PARAMS.to_owned(), json_object(&given)));
+            let values = draft.parameters.iter().map(|s| {
+                let value = value_of(overrides, &s.name).unwrap_or(s.value);
+                (s.name.clone(), value, Distribution::Float(s.range))
+            });
+            // A program that is ended within the append leaves a trial that has begun with all of this, or none.
             let mut operations = match (draft.waiting, waiting) {
-                (None, _) => vec![Operation::CreateTrial { study, started: now, template: None }],
+                (None, _) => {
+                    let mut begun = Trial::new(draft.number, TrialState::Running);
+                    values.for_each(|(name, value, distribution)| begun.set(&name, value, distribution));
+                    begun.system_attributes = system.into_iter().chain(fixed).collect();
+                    begun.user_attributes = attributes.iter().cloned().collect();
+                    vec![Operation::CreateTrial { study, started: now, template: Some(Box::new(begun)) }]
+                }
                 (_, Some(trial)) if trial.state == TrialState::Waiting && draft.is_of(trial) => {
-                    vec![Operation::SetState { trial: id, state: TrialState::Running, values: None, at: now }]
+                    let set = |(key, value): (String, Value)| {
+                        Operation::trial_attribute(id, AttributeKind::System, &key, value)
+                    };
+                    let mut contents: Vec<Operation> = user_attributes(id, attributes).collect();
+                    contents.extend(values.map(|(name, value, distribution)| Operation::SetParameter {
+                        trial: id,
+                        name,
+                        value,
+                        distribution,
+                    }));
+                    contents.extend(system.into_iter().map(set));
+                    contents.push(Operation::SetState { trial: id, state: TrialState::Running, values: None, at: now });
+                    contents.extend(fixed.map(set));
+                    contents
                 }
                 _ => return Err(stale()),
             };
-            let mut system = announcement(&draft.joint);
-            if !given.is_empty() {
-                system.push((FIXED_PARAMS.to_owned(), json_object(&given)));
-            }
-            system.push((DRAWS.to_owned(), json!(StreamPosition { seed, draws })));
-            let set =
-                |(key, value): (String, Value)| Operation::trial_attribute(id, AttributeKind::System, &key, value);
-            operations.extend(system.into_iter().map(set));
-            operations.extend(draft.parameters.iter().map(|s| {
-                let value = value_of(overrides, &s.name).unwrap_or(s.value);
-                let distribution = Distribution::Float(s.range);
-                Operation::SetParameter { trial: id, name: s.name.clone(), value, distribution }
-            }));
-            operations.extend(user_attributes(id, attributes));
             if state != TrialState::Running {
                 operations.push(Operation::SetState { trial: id, state, values: None, at: now });
             }
@@ -230,7 +243,9 @@ impl Study {
             draws.model.max(draws.startup) <= (u64::from(t.number) + 1).saturating_mul(MOST_DRAWS)
         };
         let seed = self.options.sampler.seed;
-        let own = self.trials().iter().filter_map(|t| position(t).filter(|p| p.seed == seed && reachable(t, p.draws)));
+        // One whose begin was cut off still waits: its draws are repeated.
+        let begun = self.trials().iter().filter(|t| t.state != TrialState::Waiting);
+        let own = begun.filter_map(|t| position(t).filter(|p| p.seed == seed && reachable(t, p.draws)));
         own.map(|p| p.draws)
             .fold(Draws::default(), |a, b| Draws { model: a.model.max(b.model), startup: a.startup.max(b.startup) })
     }

@@ -84,7 +84,8 @@ impl Study {
                 let attributes = journal.studies().get(study).map(|record| &record.user_attributes);
                 let before = attributes.and_then(|of| of.get(&key)).and_then(Value::as_array);
                 let changes: Vec<Value> = before.into_iter().flatten().cloned().chain([json!(change)]).collect();
-                Ok(study_attributes(study, &[(key.clone(), changes.into()), (MODEL_BEST.to_owned(), Value::Null)])
+                // The verdict last: one that was cut off leaves no best trial of before.
+                Ok(study_attributes(study, &[(MODEL_BEST.to_owned(), Value::Null), (key.clone(), changes.into())])
                     .collect())
             }
         })?;

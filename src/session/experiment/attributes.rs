@@ -161,10 +161,10 @@ pub struct RepeatsAttribute<'a> {
 }
 
 /// Attributes that are written when a trial was measured, and when it is judged; before the verdict, and after it was taken back,
-/// the verdict and its origin are null. The verdict is the last: a judgement that was cut off has none.
+/// the verdict and its origin are null. The suggestion follows what was measured, and the verdict is the last: a judgement that was cut
+/// off has none, and one that was cut off within the measured values has no suggestion either.
 #[derive(Debug, Serialize)]
 pub struct JudgedAttributes<'a> {
-    suggested: Option<Verdict>,
     cause: &'a str,
     value: Option<f64>,
     hand_value: Option<f64>,
@@ -174,6 +174,7 @@ pub struct JudgedAttributes<'a> {
     measured: Option<&'a MeasuredJump>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     repeats: &'a [RepeatRecord],
+    suggested: Option<Verdict>,
     judged_by: Option<JudgedBy>,
     verdict: Option<Verdict>,
 }
@@ -196,15 +197,15 @@ impl JudgedAttributes<'_> {
     }
 }
 
-/// Attributes of a trial whose program ended before the verdict.
+/// Attributes of a trial whose program ended before the verdict. The verdict is the last, as of [`JudgedAttributes`].
 #[derive(Debug, Serialize)]
 pub struct InterruptedAttributes<'a> {
-    pub verdict: Verdict,
-    /// None for a trial that did not run.
-    pub judged_by: Option<JudgedBy>,
     pub cause: &'a str,
     pub rerun: bool,
     pub interrupted: bool,
+    /// None for a trial that did not run.
+    pub judged_by: Option<JudgedBy>,
+    pub verdict: Verdict,
 }
 
 /// Attributes of a queued trial that was removed before it began.

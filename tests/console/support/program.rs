@@ -135,7 +135,9 @@ pub fn journal_trials(path: &Path) -> BTreeMap<u64, Value> {
         let id = operation["trial_id"].as_u64();
         match operation["op_code"].as_u64().unwrap() {
             4 => {
-                trials.insert(created, serde_json::json!({"params": {}, "value": null}));
+                // A trial of this program begins with its parameters; one of the queue has none yet.
+                let params = operation.get("params").cloned().unwrap_or_else(|| serde_json::json!({}));
+                trials.insert(created, serde_json::json!({"params": params, "value": null}));
                 created += 1;
             }
             5 => {

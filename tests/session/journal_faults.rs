@@ -1,0 +1,62 @@
+//! Journals that a program left in the middle of an append, or that another program changed under the session.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{accept, approve, open, study_in};
+use quadfrog::optimize::trial::TrialState;
+use quadfrog::session::experiment::Experiment;
+use quadfrog::trial::{ExperimentStage, Verdict};
+
+/// Trials of the study below that count.
+const COUNTED: u32 = 4;
+
+/// Continues the study in `folder` to its end. Returns point, value and seed of each complete trial.
+fn completed(folder: &Path, mut experiment: Experiment) -> Vec<String> {
+    if experiment.stage() == ExperimentStage::Review {
+        experiment.judge(Verdict::Accept, false).unwrap();
+    }
+    while experiment.counted() < COUNTED {
+        accept(&mut experiment);
+    }
+    experiment.close().unwrap();
+    let study = study_in(folder);
+    let complete = study.trials().iter().filter(|trial| trial.state == TrialState::Complete);
+    let result = complete.map(|trial| {
+        let point = ["f0", "Fx", "Fz"].map(|name| trial.parameter(name).unwrap());
+        format!("{point:?} {:?} {}", trial.value, trial.user_attributes["seed"])
+    });
+    result.collect()
+}
+
+/// Regression: a trial whose lines were cut off after the first one belonged to no session. `--resume` waited a minute for it and then
+/// ran other trials than an unbroken study, and a judgement without its measured values ended every `optimize --resume`.
+#[test]
+fn a_study_that_was_cut_off_at_any_line_continues_as_an_unbroken_one() {
+    let begin = || {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = open(folder.path());
+        accept(&mut experiment);
+        study_in(folder.path()).enqueue(&[("Fx".to_owned(), 77.0)], &[]).unwrap();
+        experiment.refresh().unwrap();
+        (folder, experiment)
+    };
+    let (folder, experiment) = begin();
+    let unbroken = completed(folder.path(), experiment);
+    let (folder, mut experiment) = begin();
+    let journal = folder.path().join("study.log");
+    let queued = fs::read_to_string(&journal).unwrap().lines().count();
+    accept(&mut experiment);
+    approve(&mut experiment);
+    drop(experiment);
+    // The interrupted trial is closed and queued again.
+    assert_eq!(completed(folder.path(), open(folder.path())), unbroken);
+    let whole = fs::read_to_string(&journal).unwrap();
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    for kept in queued..lines.len() {
+        let half = &lines[kept][..lines[kept].len() / 2];
+        fs::write(&journal, lines[..kept].concat() + half).unwrap();
+        let continued = completed(folder.path(), open(folder.path()));
+        assert_eq!(continued, unbroken, "cut off after line {kept}, {}", lines[kept - 1]);
+    }
+}
