@@ -3,13 +3,21 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{accept, approve, open, study_in};
+use crate::support::{accept, approve, open, run, study_in};
 use quadfrog::optimize::trial::TrialState;
 use quadfrog::session::experiment::Experiment;
+use quadfrog::telemetry::TrialEnd;
 use quadfrog::trial::{ExperimentStage, Verdict};
 
 /// Trials of the study below that count.
 const COUNTED: u32 = 4;
+
+/// Appends a line of another program.
+fn append(folder: &Path, line: &str) {
+    let journal = folder.join("study.log");
+    let text = fs::read_to_string(&journal).unwrap();
+    fs::write(&journal, format!("{text}{line}\n")).unwrap();
+}
 
 /// Continues the study in `folder` to its end. Returns point, value and seed of each complete trial.
 fn completed(folder: &Path, mut experiment: Experiment) -> Vec<String> {
@@ -58,5 +66,31 @@ fn a_study_that_was_cut_off_at_any_line_continues_as_an_unbroken_one() {
         fs::write(&journal, lines[..kept].concat() + half).unwrap();
         let continued = completed(folder.path(), open(folder.path()));
         assert_eq!(continued, unbroken, "cut off after line {kept}, {}", lines[kept - 1]);
+    }
+}
+
+/// Regression: a verdict on a study that another program had deleted was confirmed and lost, and a queued point began and ran without a
+/// line in the journal.
+#[test]
+fn a_deleted_study_begins_no_trial_and_takes_no_verdict() {
+    for queued in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut experiment = open(folder.path());
+        let delete = || append(folder.path(), r#"{"op_code":1,"worker_id":"py","study_id":0}"#);
+        if queued {
+            study_in(folder.path()).enqueue(&[("Fx".to_owned(), 77.0)], &[]).unwrap();
+            experiment.refresh().unwrap();
+            delete();
+            let seen = experiment.proposal().unwrap();
+            let error = experiment.approve(seen.trial, seen.revision).unwrap_err().to_string();
+            assert!(error.contains("`test` is no longer in the journal"), "{error}");
+            assert_eq!(experiment.stage(), ExperimentStage::Proposed);
+        } else {
+            run(&mut experiment, TrialEnd::Settled);
+            delete();
+            let error = experiment.judge(Verdict::Accept, false).unwrap_err().to_string();
+            assert!(error.contains("`test` is no longer in the journal"), "{error}");
+            assert_eq!(experiment.stage(), ExperimentStage::Review);
+        }
     }
 }

@@ -184,7 +184,7 @@ impl Study {
         let draws = if nothing_drawn { draft.before } else { draft.after };
         let (study, seed) = (self.id, draft.seed);
         let mut id = 0;
-        self.journal.commit(|journal| {
+        self.commit(|journal| {
             if !journal.studies().get(study).is_some_and(|record| room(&record.trials)) {
                 return Err(StudyError::Full);
             }

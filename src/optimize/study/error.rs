@@ -38,6 +38,8 @@ pub enum StudyError {
         u32::MAX
     )]
     NoWorkerLeft { attribute: &'static str, joined: u64 },
-    #[error("study `{0}` is no longer in the journal: it was deleted or renamed by another program")]
+    #[error(
+        "study `{0}` is no longer in the journal: it was deleted or renamed by another program. Nothing more is stored in it; under a new name it is continued once it is opened again"
+    )]
     Gone(String),
 }

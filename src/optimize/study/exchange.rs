@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{Study, StudyError};
-use crate::optimize::journal::{AttributeKind, JournalError, JournalState, Operation};
+use crate::optimize::journal::{AttributeKind, JournalState, Operation};
 use crate::optimize::trial::{FIXED_PARAMS, Trial, TrialState};
 
 /// System attribute of the study: the new points of two trials by their ids; null when they have them.
@@ -18,10 +18,10 @@ impl Study {
     pub fn exchange_waiting(&mut self, one: u32, other: u32) -> Result<bool, StudyError> {
         let (one, other) = (self.trial(one)?.id, self.trial(other)?.id);
         let study = self.id;
-        let applied = self.journal.commit(|journal| {
+        let applied = self.commit(|journal| {
             let waiting = |id| journal.trial(id).filter(|trial| trial.state == TrialState::Waiting);
             let (Some(first), Some(second)) = (waiting(one), waiting(other)) else {
-                return Ok::<_, JournalError>(Vec::new());
+                return Ok(Vec::new());
             };
             let points =
                 json!({ one.to_string(): point_of(second, first), other.to_string(): point_of(first, second) });
@@ -39,9 +39,9 @@ impl Study {
             attributes.get(EXCHANGE).filter(|points| points.is_object()).cloned()
         };
         if pending(self.journal.state()).is_some() {
-            self.journal.commit(|journal| {
+            self.commit(|journal| {
                 let points = pending(journal);
-                Ok::<_, JournalError>(points.map_or_else(Vec::new, |points| completion(journal, study, &points)))
+                Ok(points.map_or_else(Vec::new, |points| completion(journal, study, &points)))
             })?;
         }
         Ok(())

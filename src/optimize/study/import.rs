@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{Study, StudyError};
 use crate::optimize::exchange::TableTrial;
-use crate::optimize::journal::{JournalError, Operation};
+use crate::optimize::journal::Operation;
 use crate::optimize::trial::{Distribution, Trial, TrialState};
 
 impl Study {
@@ -38,7 +38,7 @@ impl Study {
             creations.push((trial, create));
         }
         let study = self.id;
-        let applied = self.journal.commit(|journal| {
+        let applied = self.commit(|journal| {
             let mut there: Vec<&Trial> = journal.studies().get(study).map_or(Vec::new(), |s| s.trials.iter().collect());
             let mut is_new = |row: &TableTrial| match there.iter().position(|trial| is_same(row, trial)) {
                 // A trial matches one row.
@@ -49,7 +49,7 @@ impl Study {
                 None => true,
             };
             let new = creations.iter().filter(|(row, _)| is_new(row)).map(|(_, create)| create.clone());
-            Ok::<_, JournalError>(new.collect())
+            Ok(new.collect())
         })?;
         let created: Vec<u32> = self.created(&applied).collect();
         let mut noted: Vec<&TableTrial> = trials.iter().filter(|row| !row.note.is_empty()).collect();

@@ -25,7 +25,7 @@ pub use workers::worker_seed;
 
 use crate::optimize::ask::{Direction, Draws, SamplerConfig, Streams};
 use crate::optimize::journal::{
-    Applied, AttributeKind, Durability, Journal, JournalError, JournalWait, Operation, StudyRecord,
+    Applied, AttributeKind, Durability, Journal, JournalError, JournalState, JournalWait, Operation, StudyRecord,
 };
 use crate::optimize::prior::PriorModel;
 use crate::optimize::space::Space;
@@ -217,6 +217,21 @@ impl Study {
         applied.iter().filter_map(|result| match result {
             Applied::Created(id) => self.journal.state().trial(*id).map(|trial| trial.number),
             _ => None,
+        })
+    }
+
+    /// [`Journal::commit`] while the study is in the journal.
+    ///
+    /// # Errors
+    /// [`StudyError::Gone`] if another program has deleted it: every reader ignores lines of a deleted study.
+    fn commit(
+        &mut self,
+        mut decide: impl FnMut(&JournalState) -> Result<Vec<Operation>, StudyError>,
+    ) -> Result<Vec<Applied>, StudyError> {
+        let study = self.id;
+        self.journal.commit(|journal| match journal.studies().get(study) {
+            Some(record) if record.deleted => Err(StudyError::Gone(record.name.clone())),
+            _ => decide(journal),
         })
     }
 

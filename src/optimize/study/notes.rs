@@ -2,7 +2,7 @@
 //! end of a trial.
 
 use super::{Study, StudyError};
-use crate::optimize::journal::{AttributeKind, JournalError, Operation};
+use crate::optimize::journal::{AttributeKind, Operation};
 use crate::optimize::trial::pieces;
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ impl Study {
     pub fn note(&mut self, trial: u32, text: &str) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
         let study = self.id;
-        self.journal.commit(|journal| {
+        self.commit(|journal| {
             let attributes = &journal.studies()[study].system_attributes;
             let version = format!("dashboard:{id}:note_ver");
             let next = attributes.get(&version).and_then(Value::as_u64).map_or(1, |v| v + 1);
@@ -22,7 +22,7 @@ impl Study {
             }
             let set = |key: &str, value| Operation::study_attribute(study, AttributeKind::System, key, value);
             let pieces = pieces.into_iter().enumerate().map(|(i, piece)| set(&key(i), Value::from(piece)));
-            Ok::<_, JournalError>(std::iter::once(set(&version, Value::from(next))).chain(pieces).collect())
+            Ok(std::iter::once(set(&version, Value::from(next))).chain(pieces).collect())
         })?;
         Ok(())
     }

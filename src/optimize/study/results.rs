@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::best::MODEL_BEST;
 use super::{Outcome, Study, StudyError, TellOutcome, study_attributes, user_attributes};
-use crate::optimize::journal::{Applied, JournalError, Operation};
+use crate::optimize::journal::{Applied, Operation};
 use crate::optimize::trial::{CHANGED_VERDICT, FIXED_PARAMS, Trial, TrialState, VerdictChange, json_object};
 
 /// Parameters and user attributes of a trial to enqueue.
@@ -16,7 +16,7 @@ impl Study {
     /// ([`StudyError::State`]), see [`Study::note`].
     pub fn annotate(&mut self, trial: u32, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
-        self.journal.commit(|journal| match journal.trial(id) {
+        self.commit(|journal| match journal.trial(id) {
             Some(t) if t.state.is_finished() => Err(StudyError::State {
                 trial,
                 state: t.state,
@@ -54,7 +54,7 @@ impl Study {
             Outcome::Complete(value) => (TrialState::Complete, Some(vec![value])),
             Outcome::Fail => (TrialState::Fail, None),
         };
-        let applied = self.journal.commit(|journal| match journal.trial(id) {
+        let applied = self.commit(|journal| match journal.trial(id) {
             Some(t) if t.state.is_finished() => Ok(Vec::new()),
             Some(t) if t.state == TrialState::Waiting && outcome != Outcome::Fail => {
                 Err(StudyError::State { trial, state: t.state, action: "it cannot have a value: begin it first" })
@@ -76,7 +76,7 @@ impl Study {
     pub fn change_verdict(&mut self, trial: u32, change: &VerdictChange) -> Result<(), StudyError> {
         let id = self.trial(trial)?.id;
         let (study, key) = (self.id, format!("{CHANGED_VERDICT}{trial}"));
-        self.journal.commit(|journal| match journal.trial(id) {
+        self.commit(|journal| match journal.trial(id) {
             Some(t) if !t.state.is_finished() => {
                 Err(StudyError::State { trial, state: t.state, action: "its verdict is not final: judge it" })
             }
@@ -116,9 +116,9 @@ impl Study {
     ) -> Result<Option<u32>, StudyError> {
         let create = self.queued(parameters, attributes)?;
         let study = self.id;
-        let applied = self.journal.commit(|journal| {
+        let applied = self.commit(|journal| {
             let needed = journal.studies().get(study).is_some_and(|record| !done(&record.trials));
-            Ok::<_, JournalError>(if needed { vec![create.clone()] } else { Vec::new() })
+            Ok(if needed { vec![create.clone()] } else { Vec::new() })
         })?;
         Ok(self.created(&applied).next())
     }
@@ -128,7 +128,7 @@ impl Study {
     pub fn enqueue_all(&mut self, points: &[WaitingPoint]) -> Result<Vec<u32>, StudyError> {
         let creations = points.iter().map(|(parameters, attributes)| self.queued(parameters, attributes));
         let creations = creations.collect::<Result<Vec<_>, _>>()?;
-        let applied = self.journal.commit(|_| Ok::<_, JournalError>(creations.clone()))?;
+        let applied = self.commit(|_| Ok(creations.clone()))?;
         Ok(self.created(&applied).collect())
     }
 
@@ -147,7 +147,7 @@ impl Study {
     /// Sets user attributes of the study.
     pub fn annotate_study(&mut self, attributes: &[(String, Value)]) -> Result<(), StudyError> {
         let study = self.id;
-        self.journal.commit(|_| Ok::<_, JournalError>(study_attributes(study, attributes).collect()))?;
+        self.commit(|_| Ok(study_attributes(study, attributes).collect()))?;
         Ok(())
     }
 }

@@ -12,13 +12,13 @@ impl Study {
     pub fn join(&mut self) -> Result<u32, StudyError> {
         let study = self.id;
         let mut worker = 0;
-        self.journal.commit(|journal| {
+        self.commit(|journal| {
             let joined =
                 journal.studies().get(study).and_then(|record| record.system_attributes.get(WORKERS)?.as_u64());
             let joined = joined.unwrap_or(0);
             let next = u32::try_from(joined).ok().and_then(|joined| joined.checked_add(1));
             worker = next.ok_or(StudyError::NoWorkerLeft { attribute: WORKERS, joined })?;
-            Ok::<_, StudyError>(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
+            Ok(vec![Operation::study_attribute(study, AttributeKind::System, WORKERS, worker)])
         })?;
         self.options.sampler.seed = worker_seed(self.options.sampler.seed, worker);
         self.begin_streams();
