@@ -2,8 +2,9 @@
 
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
-use crate::support::{accept, approve, open, run, study_in};
+use crate::support::{accept, approve, joined, open, run, study_in};
 use quadfrog::optimize::trial::TrialState;
 use quadfrog::session::experiment::Experiment;
 use quadfrog::telemetry::TrialEnd;
@@ -93,4 +94,28 @@ fn a_deleted_study_begins_no_trial_and_takes_no_verdict() {
             assert_eq!(experiment.stage(), ExperimentStage::Review);
         }
     }
+}
+
+/// Regression: of a trial of another program attributes alone were news. One that ran for longer than `abandoned_s` and reported
+/// intermediate values counted as abandoned, and the budget was exceeded.
+#[test]
+fn a_trial_that_reports_intermediate_values_is_not_abandoned() {
+    let folder = tempfile::tempdir().unwrap();
+    drop(open(folder.path()));
+    append(
+        folder.path(),
+        r#"{"op_code":4,"worker_id":"py","study_id":0,"datetime_start":"2026-01-01T00:00:00.000000+00:00"}"#,
+    );
+    let mut experiment = joined(folder.path(), 5, Duration::from_secs(1));
+    for step in 0..6 {
+        let report =
+            format!(r#"{{"op_code":7,"worker_id":"py","trial_id":0,"step":{step},"intermediate_value":0.{step}}}"#);
+        append(folder.path(), &report);
+        experiment.refresh().unwrap();
+        assert!(experiment.others_run(), "after report {step}");
+        std::thread::sleep(Duration::from_millis(300));
+    }
+    std::thread::sleep(Duration::from_millis(900));
+    experiment.refresh().unwrap();
+    assert!(!experiment.others_run(), "without news it is abandoned");
 }

@@ -4,8 +4,6 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use serde_json::Value;
-
 use crate::optimize::trial::{Trial, TrialState};
 
 /// Times at which this session has seen the last news of running trials.
@@ -13,8 +11,8 @@ use crate::optimize::trial::{Trial, TrialState};
 pub struct Liveness {
     /// Time without news after which a running trial counts as abandoned.
     abandoned: Duration,
-    /// By number: time of the last news, and the user attributes then.
-    last_news: BTreeMap<u32, (Instant, BTreeMap<String, Value>)>,
+    /// By number: time of the last news, and the trial then.
+    last_news: BTreeMap<u32, (Instant, Trial)>,
 }
 
 impl Liveness {
@@ -29,9 +27,9 @@ impl Liveness {
         let running = trials.iter().filter(|trial| trial.state == TrialState::Running);
         self.last_news = running
             .map(|trial| {
-                // A judgement is news: it adds attributes, or replaces those of the rollout before.
-                let since = before.remove(&trial.number).filter(|(_, had)| *had == trial.user_attributes);
-                (trial.number, since.unwrap_or_else(|| (now, trial.user_attributes.clone())))
+                // Every line is news: a judgement replaces the attributes of the rollout before, another program reports values.
+                let since = before.remove(&trial.number).filter(|(_, had)| had == trial);
+                (trial.number, since.unwrap_or_else(|| (now, trial.clone())))
             })
             .collect();
     }
