@@ -206,6 +206,11 @@ pub fn fingerprint(config: &Config, robot: &RobotDescription) -> String {
     fnv1a(config.as_run.iter().chain(&robot.files).flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]))
 }
 
+/// Returns a short name of the robot's files, to compare the robots of workers on several hosts.
+pub(super) fn robot_fingerprint(robot: &RobotDescription) -> String {
+    fnv1a(robot.files.iter().flat_map(|(name, text)| [name.as_bytes(), text.as_bytes()]))
+}
+
 /// Returns the FNV-1a hash of texts one after the other, 64 bits, as hexadecimal digits.
 pub(super) fn fnv1a<'a>(texts: impl Iterator<Item = &'a [u8]>) -> String {
     let hash = texts

@@ -147,6 +147,10 @@ pub enum EngineError {
     )]
     OtherBackend { study: String, made: String, asked: String },
     #[error(
+        "{study}: it was made with another robot of the name {robot}: its files have the hash {made}, those of this worker {own}; give --model with the files of the study's robot, which are in config/robot of the folder of every session and worker of the study"
+    )]
+    OtherRobot { study: String, robot: String, made: String, own: String },
+    #[error(
         "{study}: its values are in {stored}, those of this session would be in {asked}, and the two cannot be compared. Set `rate` in [tasks.{task}] of control.toml as the study has it, or begin a new study"
     )]
     OtherUnit { study: String, task: &'static str, stored: String, asked: &'static str },

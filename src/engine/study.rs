@@ -4,7 +4,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::folder::STUDY_FILE;
+use super::folder::{STUDY_FILE, robot_fingerprint};
 use super::options::{EngineError, Options};
 use super::stored::has_journal;
 use crate::optimize::ask::{Direction, SamplerConfig, SamplerKind};
@@ -96,7 +96,8 @@ fn take_over(options: &Options, study: &mut Study) -> Result<Option<String>, Eng
 /// configuration.
 ///
 /// # Errors
-/// When the study cannot be read, is of another task or another unit of the objective, or is to be continued and is not there.
+/// When the study cannot be read, is of another task, another unit of the objective or, to be joined, another robot, or is to be continued
+/// and is not there.
 pub fn open_study(options: &Options, durability: Durability) -> Result<Study, EngineError> {
     let parameters = options.config.parameters(options.task);
     let space = space_of(&parameters)?;
@@ -114,6 +115,7 @@ pub fn open_study(options: &Options, durability: Durability) -> Result<Study, En
             attributes: attributes::write(&NewStudyAttributes {
                 task: options.task,
                 robot: &options.robot.name,
+                robot_files: robot_fingerprint(&options.robot),
                 seed: options.seed,
                 sampler: &sampler,
                 version: env!("CARGO_PKG_VERSION"),
@@ -124,7 +126,11 @@ pub fn open_study(options: &Options, durability: Durability) -> Result<Study, En
             durability,
         },
     )?;
-    require_unit(options, &StudyAttributes::of(study.attributes()))?;
+    let stored = StudyAttributes::of(study.attributes());
+    require_unit(options, &stored)?;
+    if options.join.is_some() {
+        require_robot(options, &stored)?;
+    }
     if let Some(prior) = &options.prior {
         study.use_prior(Arc::clone(prior));
     }
@@ -185,6 +191,22 @@ fn require_unit(options: &Options, study: &StudyAttributes) -> Result<(), Engine
     }
     let (study, stored) = (format!("{}, study {}", storage(options), name(options)), stored.to_owned());
     Err(EngineError::OtherUnit { study, task: task.name(), stored, asked })
+}
+
+/// Refuses to join a study whose robot has the same name and other files: there need be no folder with the study's own. Of another
+/// version of this program the files of a built-in robot may differ.
+fn require_robot(options: &Options, study: &StudyAttributes) -> Result<(), EngineError> {
+    let same_version = study.version.as_deref() == Some(env!("CARGO_PKG_VERSION"));
+    let own = robot_fingerprint(&options.robot);
+    match &study.robot_files {
+        Some(made) if *made != own && same_version => Err(EngineError::OtherRobot {
+            study: format!("{}, study {}", storage(options), name(options)),
+            robot: options.robot.name.clone(),
+            made: made.clone(),
+            own,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a study that is to be continued and is not there.

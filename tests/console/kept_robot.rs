@@ -63,3 +63,21 @@ fn a_study_without_a_kept_robot_is_continued_by_its_name() {
     assert_shows(&program.refused(&resume), &["holds a study of the a1; give --model a1"]);
     program.text(&[&resume[..], &["--model", "light"]].concat());
 }
+
+/// Regression: a worker joined a journal without a folder, as on a Redis server, with any robot of the study's name.
+#[test]
+fn a_worker_joins_with_the_robot_of_the_study_and_not_with_another_of_its_name() {
+    let (program, _) = study_of_a_light_a1();
+    let journal = program.path("shared/any.log").to_str().unwrap().to_owned();
+    let join = ["optimize", "--record", "none", "--join", &journal, "--trials"];
+    program.text(&[&join[..], &["2", "--model", "light", "--task", "forward", "--seed", "3"]].concat());
+    program.text(&[&join[..], &["3", "--model", "light"]].concat());
+    let before = fs::read_to_string(&journal).unwrap();
+    let message = program.refused(&[&join[..], &["4", "--model", "a1"]].concat());
+    assert_shows(&message, &["any.log, study forward-seed3", "another robot of the name a1", "give --model"]);
+    assert_eq!(fs::read_to_string(&journal).unwrap(), before);
+    // A study of an earlier version does not say which robot it had.
+    let earlier: String = before.split_inclusive('\n').filter(|line| !line.contains("robot_files")).collect();
+    fs::write(&journal, earlier).unwrap();
+    program.text(&[&join[..], &["4", "--model", "a1"]].concat());
+}

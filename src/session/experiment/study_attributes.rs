@@ -14,6 +14,8 @@ use crate::trial::Task;
 pub struct NewStudyAttributes<'a> {
     pub task: Task,
     pub robot: &'a str,
+    /// Hash of the robot's files.
+    pub robot_files: String,
     pub seed: u32,
     pub sampler: &'a SamplerConfig,
     pub version: &'static str,
@@ -47,6 +49,10 @@ pub struct BudgetAttribute {
 pub struct StudyAttributes {
     pub task: Option<Task>,
     pub robot: Option<String>,
+    /// Hash of the robot's files; none for a study of an earlier version.
+    pub robot_files: Option<String>,
+    /// Version that made it.
+    pub version: Option<String>,
     pub seed: Option<u32>,
     pub budget: Option<u32>,
     /// Unit of the objective; none for that of the task.
