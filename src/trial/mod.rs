@@ -12,7 +12,7 @@ pub use self::parameters::{
     GAIN_UNITS, Gains, JumpParameters, ParameterInfo, ParameterValues, is_gain, other_gains, parameter_unit,
 };
 pub(crate) use self::record::NOT_RECORDED;
-pub use self::record::{NOT_RUN, REMOVED, SKIPPED, TrialRecord, is_changed_verdict};
+pub use self::record::{NOT_RUN, PRUNED, REMOVED, SKIPPED, TrialRecord, is_changed_verdict};
 pub use self::search::{
     DrawnRange, FixedParameter, ParameterInsight, PointRecord, PredictedTrial, ProposalInsight, QueuedPoint,
     SearchStatus, SearchedParameter, SimulatorComparison, WorldResemblance,

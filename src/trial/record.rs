@@ -56,6 +56,9 @@ pub const SKIPPED: &str = "skipped before the jump";
 /// Begin of the cause of a trial that the program did not let run.
 pub const NOT_RUN: &str = "not run: ";
 
+/// Cause of a trial that another program has pruned: it is void.
+pub const PRUNED: &str = "stopped early by another program";
+
 /// Part of the cause of a trial that jumped and was not measured, because its recording is not whole.
 pub(crate) const NOT_RECORDED: &str = "not recorded: not measured";
 
@@ -106,12 +109,13 @@ impl TrialRecord {
     }
 
     /// Returns the name of its verdict on screens and in reports; a trial that did not run has none, and one of another
-    /// program is complete or has failed until it is judged here. None while it runs or waits.
+    /// program is complete, pruned or has failed until it is judged here. None while it runs or waits.
     pub fn verdict_name(&self) -> Option<&'static str> {
         let of_other_program = self.source == ProposalSource::OtherProgram && self.judged_by.is_none();
         Some(match self.verdict? {
             _ if self.was_not_run() => "not run",
             Verdict::Accept if of_other_program => "complete",
+            Verdict::Void if of_other_program && self.cause == PRUNED => "pruned",
             Verdict::Void if of_other_program => "failed",
             verdict => verdict.name(),
         })

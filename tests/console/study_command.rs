@@ -636,3 +636,24 @@ fn parameters_of_another_program_have_six_digits() {
         assert_shows(&best, &["Best: trial 0  rate 0.00123457 "]);
     }
 }
+
+/// Regression: a trial that Optuna had pruned was shown as failed in a study of this program.
+#[test]
+fn a_pruned_trial_of_another_program_is_no_failed_one() {
+    let (program, study) = study("forward");
+    let journal = program.path(&study).join("study.log");
+    let text = fs::read_to_string(&journal).unwrap()
+        + r#"{"op_code":4,"worker_id":"py","study_id":0,"datetime_start":"2026-01-01T00:00:00+00:00"}
+{"op_code":7,"worker_id":"py","trial_id":6,"step":1,"intermediate_value":0.3}
+{"op_code":6,"worker_id":"py","trial_id":6,"state":2,"values":[0.3],"datetime_complete":"2026-01-01T00:00:01+00:00"}
+{"op_code":4,"worker_id":"py","study_id":0,"datetime_start":"2026-01-01T00:00:00+00:00"}
+{"op_code":6,"worker_id":"py","trial_id":7,"state":3,"values":null,"datetime_complete":"2026-01-01T00:00:01+00:00"}
+"#;
+    fs::write(&journal, text).unwrap();
+    let shown = program.text(&["study", "show", &study]);
+    let line = |trial: &str| shown.lines().find(|line| line.trim_start().starts_with(trial)).unwrap();
+    assert!(line("6 ").ends_with("pruned: stopped early by another program"), "{shown}");
+    assert!(line("7 ").ends_with("failed"), "{shown}");
+    let counted = program.text(&["study", "list"]);
+    assert_eq!(counted.lines().nth(1).unwrap().split_whitespace().collect::<Vec<_>>()[1..3], ["8", "6"], "{counted}");
+}

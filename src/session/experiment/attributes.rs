@@ -14,8 +14,8 @@ use crate::optimize::ask::SamplerKind;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
-    Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, JudgedBy, MeasuredJump, ParameterInfo, ParameterValues,
-    Proposal, ProposalSource, RepeatRecord, TrialRecord, Verdict, is_changed_verdict,
+    Backend, DrawnRange, ExpectedResult, FallRisk, GAIN_UNITS, JudgedBy, MeasuredJump, PRUNED, ParameterInfo,
+    ParameterValues, Proposal, ProposalSource, RepeatRecord, TrialRecord, Verdict, is_changed_verdict,
 };
 
 /// Attributes in the order in which they are written.
@@ -323,7 +323,8 @@ pub fn row_of(trial: &Trial, note: String, order: &[ParameterInfo]) -> TrialReco
     let judged = trial.state == TrialState::Running && matches!(kept.verdict, Some(Verdict::Accept | Verdict::Fall));
     // A verdict that does not fit the trial's state was overruled by another program.
     let verdict = kept.verdict.filter(fits);
-    let cause = kept.cause.unwrap_or_default();
+    let pruned = (trial.state == TrialState::Pruned).then(|| PRUNED.to_owned());
+    let cause = kept.cause.or(pruned).unwrap_or_default();
     // A change of the verdict leaves the attributes of the trial as they were.
     let changed = is_changed_verdict(&cause).then_some(JudgedBy::Operator);
     let elsewhere = !trial.user_attributes.contains_key("source") && worker_of(trial).is_none();
