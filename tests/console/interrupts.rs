@@ -204,3 +204,21 @@ fn the_service_of_a_worker_knows_its_exit_statuses() {
     send(&ended.0, Signal::SIGTERM);
     assert_eq!(value("SuccessExitStatus"), ended.0.wait().unwrap().code().unwrap().to_string());
 }
+
+/// Regression: the command was printed without the budget. That of the study was used up, and the command ended at once.
+#[test]
+fn the_command_that_continues_an_interrupted_worker_names_its_budget() {
+    let program = Program::new();
+    program.text(&["optimize", "--seed", "2", "--trials", "1", "--record", "none", "--output", "first"]);
+    let study = program.study("first").join("study.log");
+    let join = ["optimize", "--join", study.to_str().unwrap(), "--json", "--record", "none", "--trials"];
+    let mut command = program.command(&[&join[..], &["100000"]].concat());
+    let mut worker = Ended(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+    let mut lines = BufReader::new(worker.0.stdout.take().unwrap()).lines();
+    lines.next().expect("a trial").unwrap();
+    send(&worker.0, Signal::SIGTERM);
+    lines.map_while(Result::ok).for_each(drop);
+    let printed = std::io::read_to_string(worker.0.stderr.take().unwrap()).unwrap();
+    let command = format!("`quadfrog optimize --join {} --task forward --seed 2 --trials 100000`", study.display());
+    assert_shows(&printed, &["of 100000 trials counted", &command, "continues the study"]);
+}

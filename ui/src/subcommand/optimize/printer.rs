@@ -148,7 +148,12 @@ impl Printer {
     /// Prints on standard error that a signal has ended the study, and how it continues.
     pub fn interrupted(&self, study: &SelectedStudy, counted: u32, options: &Options) {
         let again = match &options.join {
-            Some(storage) => format!("--join {}", shell_word(Path::new(&storage.to_string()))),
+            // The budget of a worker is not kept in the study, and its journal may have several.
+            Some(storage) => {
+                let (place, budget) = (storage.to_string(), options.budget());
+                let (task, seed) = (study.task.name(), study.seed);
+                format!("--join {} --task {task} --seed {seed} --trials {budget}", shell_word(Path::new(&place)))
+            }
             None => format!("--resume {}", shell_word(&study.folder)),
         };
         self.notice(&format!(
