@@ -111,3 +111,19 @@ fn a_folder_of_studies_does_not_hide_the_built_in_robot() {
     fs::write(program.path("go1/robot.toml"), "legs = 5").unwrap();
     assert_shows(&program.refused(&["optimize", "--trials", "1"]), &["go1/robot.toml"]);
 }
+
+/// Regression: the folder `config` beside a journal that is shared was taken for the configuration of its study.
+#[test]
+fn a_folder_beside_a_shared_journal_is_not_its_configuration() {
+    let program = Program::new();
+    program.write("config/optimize.toml", "[bounds]\nFz = [200.0, 210.0]\n");
+    let journal = program.path("shared.log").to_str().unwrap().to_owned();
+    let join = ["optimize", "--task", "forward", "--seed", "3", "--trials", "2", "--record", "none", "--join"];
+    program.text(&[&join[..], &[&journal]].concat());
+    assert_shows(&program.text(&["study", "show", &journal]), &["Fz from 150 to 350 N\n"]);
+    program.text(&["study", "enqueue", &journal, "Fz=300"]);
+    program.write("config/optimize.toml", "no configuration");
+    for command in [&["study", "show"][..], &["report"]] {
+        program.text(&[command, &[&journal]].concat());
+    }
+}

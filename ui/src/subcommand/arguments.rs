@@ -364,7 +364,7 @@ impl StudyArguments {
 }
 
 /// Returns the configuration that the study in `folder` ran with last; none without a study there.
-fn last_config(folder: &Path) -> Option<PathBuf> {
+pub fn last_config(folder: &Path) -> Option<PathBuf> {
     newest_config(folder).filter(|_| folder.join(STUDY_FILE).is_file()).map(|(_, config)| config)
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, has_journal, kept_robot, newest_config, open_stored, stored_studies, study_files};
+use quadfrog::engine::{Opened, has_journal, kept_robot, open_stored, stored_studies, study_files};
 use quadfrog::optimize::study::Storage;
 use quadfrog::recording::player::Player;
 use quadfrog::recording::session_files::recordings_in;
@@ -16,6 +16,7 @@ use quadfrog::session::experiment::fixed_in_words;
 use quadfrog::trial::{Backend, ParameterValues, PredictedTrial, TrialRecord};
 use serde_json::Value;
 
+use crate::subcommand::arguments::last_config;
 use crate::subcommand::failure::Failure;
 use crate::subcommand::replay::{is_written, lacks_its_end_alone};
 use crate::subcommand::selection::parse_storage;
@@ -43,7 +44,7 @@ fn of_storage(storage: &Storage) -> Result<Vec<ReportedStudy>, Failure> {
         Storage::File(file) => file.parent().map(Path::to_owned),
         _ => None,
     };
-    let kept = folder.as_deref().and_then(newest_config).map(|(_, config)| config);
+    let kept = folder.as_deref().and_then(last_config);
     let config = Config::load(kept.as_deref())?;
     let ours = if has_journal(storage)? { stored_studies(storage)? } else { Vec::new() };
     let mut opened: Vec<Opened> = Vec::new();

@@ -3,9 +3,10 @@
 use clap::Args;
 use clap_complete::ArgValueCandidates;
 use quadfrog::config::Config;
-use quadfrog::engine::{Opened, newest_config, open_stored};
+use quadfrog::engine::{Opened, open_stored};
 use quadfrog::optimize::study::Storage;
 
+use crate::subcommand::arguments::last_config;
 use crate::subcommand::completion;
 use crate::subcommand::failure::Failure;
 use crate::subcommand::selection::parse_storage;
@@ -25,10 +26,10 @@ impl StudySelector {
     pub fn config(&self) -> Result<Config, Failure> {
         let own = match parse_storage(&self.place) {
             // A folder of studies may have one of the name `config`.
-            Storage::File(file) if file.is_file() => file.parent().and_then(newest_config),
+            Storage::File(file) if file.is_file() => file.parent().and_then(last_config),
             _ => None,
         };
-        Ok(Config::load(own.as_ref().map(|(_, config)| config.as_path()))?)
+        Ok(Config::load(own.as_deref())?)
     }
 
     /// Opens the study.
