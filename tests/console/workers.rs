@@ -177,3 +177,16 @@ fn a_worker_joins_the_study_of_a_folder() {
     let refused = program.run(&["optimize", "--join", "redis://127.0.0.1:1/0"]);
     assert_eq!(refused.status.code(), Some(1), "a server that does not answer is not unusable input");
 }
+
+/// Regression: `C` of the console was named, which has no study on a server.
+#[test]
+fn a_point_queued_on_a_server_is_run_by_a_worker_with_more_trials() {
+    let Some((_server, url)) = server() else { return };
+    let program = Program::new();
+    let join = ["optimize", "--join", &url, "--record", "none", "--trials"];
+    program.text(&[&join[..], &["1", "--task", "forward", "--seed", "3"]].concat());
+    let queued = program.text(&["study", "enqueue", &url, "Fx=77"]);
+    assert_shows(&queued, &["Queued as trial 1", "it runs once a worker joins with more --trials"]);
+    program.text(&[&join[..], &["2"]].concat());
+    assert_eq!(trials(&Storage::Redis(url))[1].parameter("Fx"), Some(77.0));
+}

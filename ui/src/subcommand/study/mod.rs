@@ -339,7 +339,7 @@ fn enqueue(selector: &StudySelector, point: &[(String, f64)]) -> Result<(), Fail
         return Err(Failure::input(format!("{name} is given twice")));
     }
     let mut opened = selector.open()?;
-    let then = until_continued(&opened);
+    let then = until_continued(selector, &opened);
     opened.study.check_point(point)?;
     let number = opened.study.enqueue(point, &[])?;
     output::text(&format!("Queued as trial {number}{then}\n"));

@@ -38,13 +38,16 @@ impl StudySelector {
     }
 }
 
-/// Says of a study that has all of its trials what makes a queued point run; empty for another study.
-pub fn until_continued(opened: &Opened) -> &'static str {
+/// Says of a study that has all of its trials what makes a queued point run; empty for another study. No console has a study on a server.
+pub fn until_continued(selector: &StudySelector, opened: &Opened) -> &'static str {
     // Also one whose verdict its session can still take back.
     let counted = opened.rows().iter().filter(|row| row.counts() && !row.confirms_best()).count();
     let budget = opened.ours.as_ref().and_then(|ours| ours.budget);
-    match budget.is_some_and(|budget| counted >= budget as usize) {
-        true => "; the study has all of its trials: it runs once `C` in the console gives more",
-        false => "",
+    match (budget.is_some_and(|budget| counted >= budget as usize), parse_storage(&selector.place)) {
+        (false, _) => "",
+        (true, Storage::Redis(_)) => {
+            "; the study has all of its trials: it runs once a worker joins with more --trials"
+        }
+        (true, _) => "; the study has all of its trials: it runs once `C` in the console gives more",
     }
 }

@@ -82,7 +82,7 @@ pub fn import(
     }
     .map_err(|error| refuse(&error))?;
     let mut opened = selector.open()?;
-    let then = until_continued(&opened);
+    let then = until_continued(selector, &opened);
     let study = &mut opened.study;
     // All or none: every row is checked before the first is added.
     let is_asked = |trial: &TableTrial| match queue {
