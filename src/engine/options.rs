@@ -138,7 +138,7 @@ pub enum EngineError {
     NoSuchStudy { journal: String, names: String },
     #[error("{journal}: study {name} cannot be used: {reason}")]
     Unusable { journal: String, name: String, reason: String },
-    #[error("{}: holds no study that this program made", file.display())]
+    #[error("{}: holds no study that this program made; give the folder of another study, or begin a new one", file.display())]
     NoStudy { file: PathBuf },
     #[error("{}: another session is running in this folder ({owner}); end it first; a console can be watched with `quadfrog attach`", folder.display())]
     InUse { folder: PathBuf, owner: String },

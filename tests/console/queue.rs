@@ -87,7 +87,8 @@ fn a_point_that_is_queued_for_a_finished_study_is_shown_and_waits_for_more_trial
     let study = study_of(folder.path());
     let study = study.to_str().unwrap();
     let queued = text(&quadfrog(folder.path(), &["study", "enqueue", study, "f0=1.1", "Fx=60", "Fz=240"]));
-    let expected = "Queued as trial 1; the study has all of its trials: it runs once `C` in the console gives more";
+    let expected =
+        "Queued as trial 1; the study has all of its trials: what is queued runs once `C` in the console gives more";
     assert_eq!(queued.split_whitespace().collect::<Vec<_>>().join(" "), expected);
     session
         .wait_for(&["The study is finished: these run once C gives it more trials.", "#1    queued          f0 1.100"]);

@@ -242,6 +242,21 @@ fn health_of_a_robot_is_whole_at_every_size() {
     }
 }
 
+/// Regression: every motor of a robot that was only observed read "on", although nothing is known of its servo mode.
+#[test]
+fn a_motor_that_was_never_commanded_is_not_shown_as_on() {
+    for (mode, state) in [(Mode::Observe, "- C -  "), (Mode::Disarmed, "- C on ")] {
+        let mut console = hardware();
+        let mut tick = state_of(5, 5, mode);
+        tick.state.motor_enabled = [true; 12];
+        console.tick(tick);
+        console.update(Msg::Snapshot(Box::new(Snapshot { tick, ..console.model.snapshot })));
+        console.press(&["5"]);
+        let screen = console.screen(120, 40);
+        assert_eq!(screen.matches(state).count(), 12, "{mode:?}\n{screen}");
+    }
+}
+
 /// Regression: the sample of the README begins within its jump, and the card said "none yet" beside a trial that ran.
 #[test]
 fn a_recording_that_begins_within_a_trial_shows_what_runs() {

@@ -186,7 +186,7 @@ fn a_point_queued_on_a_server_is_run_by_a_worker_with_more_trials() {
     let join = ["optimize", "--join", &url, "--record", "none", "--trials"];
     program.text(&[&join[..], &["1", "--task", "forward", "--seed", "3"]].concat());
     let queued = program.text(&["study", "enqueue", &url, "Fx=77"]);
-    assert_shows(&queued, &["Queued as trial 1", "it runs once a worker joins with more --trials"]);
+    assert_shows(&queued, &["Queued as trial 1", "what is queued runs once a worker joins with more --trials"]);
     program.text(&[&join[..], &["2"]].concat());
     assert_eq!(trials(&Storage::Redis(url))[1].parameter("Fx"), Some(77.0));
 }

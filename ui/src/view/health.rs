@@ -334,6 +334,8 @@ fn motor_rows(model: &Model) -> Vec<HealthRow> {
         let temperature = tick.state.motor_temperature_c[joint];
         let degrees = if measured { format!("{temperature:3.0} C") } else { "  - C".to_owned() };
         let state = match (tick.state.motor_enabled[joint], tick.limited & (1 << joint) != 0) {
+            // That of a motor that was never commanded says nothing.
+            _ if !tick.mode.commanded() => "-",
             (false, _) => "off",
             (true, false) => "on",
             (true, true) => "max",

@@ -46,8 +46,8 @@ pub fn until_continued(selector: &StudySelector, opened: &Opened) -> &'static st
     match (budget.is_some_and(|budget| counted >= budget as usize), parse_storage(&selector.place)) {
         (false, _) => "",
         (true, Storage::Redis(_)) => {
-            "; the study has all of its trials: it runs once a worker joins with more --trials"
+            "; the study has all of its trials: what is queued runs once a worker joins with more --trials"
         }
-        (true, _) => "; the study has all of its trials: it runs once `C` in the console gives more",
+        (true, _) => "; the study has all of its trials: what is queued runs once `C` in the console gives more",
     }
 }
