@@ -13,7 +13,7 @@ use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use support::{begin, forward_log, in_memory};
 use tempfile::{TempDir, tempdir};
 
@@ -262,6 +262,30 @@ fn a_writer_that_was_stopped_for_longer_than_the_grace_deletes_no_line_of_anothe
         Err::<Vec<Operation>, Failure>("refused".into())
     });
     assert!(refused.is_err() && lock.is_symlink());
+}
+
+/// Regression: of several writers that waited for a dead one each broke the lock of the next.
+#[test]
+fn a_lock_that_passes_from_one_writer_to_another_is_not_stale() {
+    let grace = Duration::from_millis(500);
+    let (_folder, path, study) = with_a_trial();
+    drop(study);
+    let (lock, next) = (path.with_file_name("study.log.lock"), path.with_file_name("next"));
+    symlink(&path, &lock).unwrap();
+    let mut waiting = Journal::open(JournalFile::new(&path, Durability::Buffered, grace).unwrap()).unwrap();
+    let waiter = std::thread::spawn(move || waiting.commit::<JournalError>(|_| Ok(Vec::new())).map(|_| Instant::now()));
+    let (begun, mut newest, mut longest) = (Instant::now(), Instant::now(), Duration::ZERO);
+    while begun.elapsed() < 3 * grace {
+        symlink(&path, &next).unwrap();
+        std::fs::rename(&next, &lock).unwrap();
+        longest = longest.max(newest.elapsed());
+        newest = Instant::now();
+        std::thread::sleep(grace / 20);
+    }
+    // The last one is dead: its lock is broken.
+    let locked = waiter.join().unwrap().unwrap();
+    // A machine that did not let this thread run for the grace time has made one stale.
+    assert!(locked >= newest || longest >= grace / 2, "{:?} before the last writer", newest - locked);
 }
 
 /// Regression: each name had its own lock, and two writers wrote at the same time.

@@ -162,7 +162,7 @@ impl JournalFile {
     fn acquire(&self) -> Result<JournalLock, JournalError> {
         let mut pause = Duration::from_millis(1);
         let mut waited = LongWait::begin();
-        let mut seen: Option<(Option<SystemTime>, Instant)> = None;
+        let mut seen: Option<(Option<SystemTime>, Option<LinkIdentity>, Instant)> = None;
         loop {
             if self.wait.is_interrupted() {
                 return Err(JournalError::Interrupted { lock: self.lock.clone() });
@@ -178,17 +178,19 @@ impl JournalFile {
                 Err(e) => return Err(JournalError::io("lock", &self.lock, e)),
             }
             drop(holder);
-            // Stale: held for the grace time without a change of the journal.
+            // Stale: held for the grace time by one writer without a change of the journal. Of several that wait for a dead writer one
+            // breaks its lock, and finds its own not broken by the others.
             let changed = fs::metadata(&self.path).and_then(|m| m.modified()).ok();
+            let link = LinkIdentity::of(&self.lock);
             match seen {
-                Some((before, since)) if before == changed => {
+                Some((before, seen_link, since)) if (before, seen_link) == (changed, link) => {
                     if since.elapsed() >= self.grace {
                         release(&self.lock);
                         seen = None;
                         continue;
                     }
                 }
-                _ => seen = Some((changed, Instant::now())),
+                _ => seen = Some((changed, link, Instant::now())),
             }
             self.wait.set(Some(WaitedFor::Lock));
             waited.announce(|| {
