@@ -117,8 +117,9 @@ pub fn pace_with_warm_up(
             return Ok(());
         }
         count += 1;
-        start_ns += instant.skipped_ns(period_ns);
-        skipped_ns += instant.skipped_ns(period_ns);
+        let whole_ns = instant.skipped_ns(period_ns);
+        start_ns += whole_ns;
+        skipped_ns += whole_ns;
     }
 }
 

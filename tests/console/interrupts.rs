@@ -59,7 +59,7 @@ fn a_signal_leaves_no_lock_of_a_journal() {
     }
 }
 
-/// Regression: `optimize | head -1` ran all trials for nobody.
+/// Regression: `optimize | head -1` ran all trials after the end of `head`.
 #[test]
 fn a_study_ends_with_the_reader_of_its_trials() {
     for format in [&["--json"][..], &[]] {

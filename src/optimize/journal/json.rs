@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 use std::cell::Cell;
 use std::fmt::Write as _;
+use std::marker::PhantomData;
 
 /// Form of the times in a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -145,35 +146,38 @@ pub fn parse_json(text: &str) -> Result<Value, String> {
 /// line repeats a member.
 pub fn parameter_names(line: &str) -> Vec<String> {
     let contents: Result<NewTrial, _> = serde_json::from_str(line).or_else(|_| serde_json::from_str(&strictly(line)));
-    contents.ok().and_then(|contents| contents.params).map_or_else(Vec::new, |names| names.0)
+    let parameters =
+        contents.ok().and_then(|contents| contents.params).map_or_else(Vec::new, |parameters| parameters.0);
+    parameters.into_iter().map(|(name, _)| name).collect()
 }
 
 #[derive(Deserialize)]
 struct NewTrial {
-    params: Option<NamesInOrder>,
+    params: Option<InOrder<IgnoredAny>>,
 }
 
-struct NamesInOrder(Vec<String>);
+/// Members of a JSON object in the order of its text; a [`Value`] sorts them. A repeated one comes again.
+pub struct InOrder<V>(pub Vec<(String, V)>);
 
-impl<'de> Deserialize<'de> for NamesInOrder {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<NamesInOrder, D::Error> {
-        struct Names;
-        impl<'de> Visitor<'de> for Names {
-            type Value = NamesInOrder;
+impl<'de, V: Deserialize<'de>> Deserialize<'de> for InOrder<V> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<InOrder<V>, D::Error> {
+        struct Members<V>(PhantomData<V>);
+        impl<'de, V: Deserialize<'de>> Visitor<'de> for Members<V> {
+            type Value = InOrder<V>;
 
             fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                formatter.write_str("parameters by name")
+                formatter.write_str("an object")
             }
 
-            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<NamesInOrder, M::Error> {
-                let mut names = Vec::new();
-                while let Some((name, IgnoredAny)) = map.next_entry()? {
-                    names.push(name);
+            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<InOrder<V>, M::Error> {
+                let mut members = Vec::new();
+                while let Some(member) = map.next_entry()? {
+                    members.push(member);
                 }
-                Ok(NamesInOrder(names))
+                Ok(InOrder(members))
             }
         }
-        deserializer.deserialize_map(Names)
+        deserializer.deserialize_map(Members(PhantomData))
     }
 }
 

@@ -4,13 +4,14 @@
 
 use std::collections::BTreeMap;
 
+use serde::de::DeserializeOwned;
 use serde::de::value::MapDeserializer;
-use serde::de::{DeserializeOwned, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::plan::ExperimentPlan;
 use crate::optimize::ask::SamplerKind;
+use crate::optimize::journal::InOrder;
 use crate::optimize::study::{DRAWS, Outcome};
 use crate::optimize::trial::{Trial, TrialState, value_of};
 use crate::trial::{
@@ -377,32 +378,8 @@ fn parse<T: DeserializeOwned>(attributes: &BTreeMap<String, Value>, kept: &dyn F
 
 /// Returns the fields of `attributes` in their order; a [`Value`] would sort them.
 pub fn write(attributes: &impl Serialize) -> Attributes {
-    let text = serde_json::to_string(attributes).and_then(|text| serde_json::from_str::<Ordered>(&text));
+    let text = serde_json::to_string(attributes).and_then(|text| serde_json::from_str::<InOrder<Value>>(&text));
     text.expect("attributes are a struct with text keys").0
-}
-
-struct Ordered(Attributes);
-
-impl<'de> Deserialize<'de> for Ordered {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Ordered, D::Error> {
-        struct InOrder;
-        impl<'de> Visitor<'de> for InOrder {
-            type Value = Ordered;
-
-            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                formatter.write_str("attributes by name")
-            }
-
-            fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Ordered, M::Error> {
-                let mut pairs = Vec::new();
-                while let Some(pair) = map.next_entry()? {
-                    pairs.push(pair);
-                }
-                Ok(Ordered(pairs))
-            }
-        }
-        deserializer.deserialize_map(InOrder)
-    }
 }
 
 fn is_empty(values: &ParameterValues) -> bool {

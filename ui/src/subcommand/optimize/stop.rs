@@ -32,7 +32,7 @@ impl StudiesStop {
         stop
     }
 
-    /// Sets the stop as SIGPIPE does if the reader of standard output has ended; the trials would run for nobody.
+    /// Sets the stop as SIGPIPE does if the reader of standard output has ended.
     pub fn end_with_reader(&self, print: impl Fn(&str)) {
         let begin = |signal| self.signal.compare_exchange(0, signal, Ordering::AcqRel, Ordering::Acquire).is_ok();
         if output::reader_has_ended() && begin(Signal::SIGPIPE as i32) {
